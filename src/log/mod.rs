@@ -43,5 +43,5 @@ pub(crate) use self::writer::{Backlog, BacklogProgress};
 
 /// A log as a file: its records as they are, for programs that check or recover one.
 pub mod file {
-    pub use super::reader::{ChunkHead, ChunkRecords, RecordStream, Section};
+    pub use super::reader::{ChunkHead, ChunkRecords, RecordStream, Section, parse_record};
 }

@@ -253,3 +253,36 @@ fn a_log_that_unpacks_to_more_than_a_log_can_is_refused_early() {
         assert!(matches!(code, Some(0 | 1)) && out.contains("would unpack to"), "{args:?}: {code:?} {out}");
     }
 }
+
+#[test]
+fn an_attachment_without_room_for_its_checksum_is_damage() {
+    let folder = Folder::new();
+    let short = |length: usize| record(op::ATTACHMENT, &vec![0; length]);
+    let in_chunk = chunk("", &short(32), 41, 0);
+    // In the index itself, and where the index says that one is.
+    let indexed = |index: &[u8]| {
+        let data = [log(&short(35)), record(op::DATA_END, &[0; 4])].concat();
+        let start = (data.len() as u64).to_le_bytes();
+        let statistics = record(op::STATISTICS, &[0; 46]);
+        let footer = record(op::FOOTER, &[&start[..], &[0; 12]].concat());
+        [&data, index, &statistics, &footer, mcap::MAGIC].concat()
+    };
+    let at = (mcap::MAGIC.len() + 9 + 8) as u64;
+    let listed = record(op::ATTACHMENT_INDEX, &[&at.to_le_bytes()[..], &[0; 40]].concat());
+    for bytes in [log(&short(32)), log(&short(35)), log(&in_chunk), indexed(&short(32)), indexed(&listed)] {
+        folder.write("short.mcap", bytes);
+        for args in [
+            &["timing", "short.mcap"][..],
+            &["log", "info", "short.mcap"],
+            &["log", "check", "short.mcap"],
+            &["log", "recover", "short.mcap", "--out", "new.mcap"],
+            &["export", "short.mcap"],
+            &["replay", "short.mcap"],
+        ] {
+            let called = folder.call(args);
+            assert!(matches!(called.code, Some(0..=2)), "{args:?}: {called:?}");
+        }
+        let called = folder.call(&["log", "check", "short.mcap"]);
+        assert!(called.out.contains("an attachment ends before its checksum"), "{called:?}");
+    }
+}

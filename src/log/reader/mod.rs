@@ -3,6 +3,7 @@
 mod chunk;
 mod foreign;
 mod framing;
+mod parsed;
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::fs::File;
@@ -14,6 +15,7 @@ use mcap::records::{Record, op};
 pub use self::chunk::{ChunkHead, ChunkRecords};
 use self::foreign::ForeignChannel;
 pub use self::framing::{RecordStream, Section};
+pub use self::parsed::parse_record;
 use super::entry::LogEntry;
 pub use super::messages::topic::{Topic, TopicKind};
 use super::messages::{self, LogMessage, foxglove};
@@ -168,7 +170,7 @@ impl<R: Read> LogReader<R> {
         if opcode == op::MESSAGE {
             return self.decode_message();
         }
-        match mcap::parse_record(opcode, body).map_err(|e| e.to_string())? {
+        match parse_record(opcode, body)? {
             Record::Schema { header, data } => {
                 self.schemas.insert(header.id, (header.name, data.into_owned()));
             }
@@ -228,7 +230,7 @@ impl<R: Read> LogReader<R> {
 
     fn decode_message(&mut self) -> Result<Option<LogEntry>, String> {
         let body = self.records.body();
-        let Ok(Record::Message { header, data }) = mcap::parse_record(op::MESSAGE, body) else {
+        let Ok(Record::Message { header, data }) = parse_record(op::MESSAGE, body) else {
             return Err("a message without its header".into());
         };
         let id = header.channel_id;

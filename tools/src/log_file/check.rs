@@ -7,6 +7,7 @@ use mcap::records::{ChunkIndex, MessageHeader, Record, Statistics, op};
 
 use super::Span;
 use super::salvage::{Found, Salvage};
+use palpate::log::file::parse_record;
 use palpate::log::{Analysis, Environment, LogEntry, LogRecord, TopicKind};
 use palpate::{Error, printable};
 
@@ -128,7 +129,7 @@ impl Checker {
     }
 
     fn record(&mut self, opcode: u8, body: &[u8], in_chunk: Option<(u64, u64)>) {
-        match mcap::parse_record(opcode, body) {
+        match parse_record(opcode, body) {
             Ok(Record::Message { header, data }) => self.message(&header, &data, in_chunk),
             Ok(Record::Schema { header, data }) => {
                 self.schemas.insert(header.id, TopicKind::of_schema(&header.name, &data));

@@ -14,6 +14,7 @@ use super::salvage::{Found, Salvage};
 use super::summary::{read_summary, record_at};
 use palpate::Error;
 use palpate::log::Environment;
+use palpate::log::file::parse_record;
 
 /// The contents of a log.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -178,7 +179,7 @@ impl LogInfo {
             match opcode {
                 op::HEADER => info.header(body),
                 op::METADATA | op::ATTACHMENT => info.metadata(opcode, body),
-                _ => match mcap::parse_record(opcode, body) {
+                _ => match parse_record(opcode, body) {
                     Ok(Record::Message { header, .. }) => {
                         info.messages += 1;
                         span.push(header.log_time);
@@ -207,7 +208,7 @@ impl LogInfo {
     }
 
     fn header(&mut self, body: &[u8]) {
-        if let Ok(Record::Header(header)) = mcap::parse_record(op::HEADER, body) {
+        if let Ok(Record::Header(header)) = parse_record(op::HEADER, body) {
             (self.library, self.profile) = (header.library, header.profile);
         }
     }
@@ -222,7 +223,7 @@ impl LogInfo {
 
     /// A metadata record or an attachment.
     fn metadata(&mut self, opcode: u8, body: &[u8]) {
-        match mcap::parse_record(opcode, body) {
+        match parse_record(opcode, body) {
             Ok(Record::Metadata(metadata)) => {
                 if metadata.name == "environment" {
                     self.environment = Some(Environment::from_map(&metadata.metadata));
@@ -235,7 +236,7 @@ impl LogInfo {
                 bytes: data.len() as u64,
             }),
             Ok(_) => {}
-            Err(error) => self.damage.push(error.to_string()),
+            Err(error) => self.damage.push(error),
         }
     }
 }

@@ -14,6 +14,7 @@ use mcap::{Attachment, Compression, McapError, Summary, WriteOptions};
 use super::Span;
 use super::salvage::{Damage, Found, Salvage};
 use super::summary::{read_summary, record_at};
+use palpate::log::file::parse_record;
 use palpate::{Error, ErrorKind};
 
 /// The yield of [`recover`]: what was saved and what was lost.
@@ -133,7 +134,7 @@ type NewLog<W> = mcap::Writer<NoSeek<W>>;
 
 /// Begins the new log, with what the header of the old one says.
 fn begin<W: Write>(output: W, header: &[u8]) -> mcap::McapResult<NewLog<W>> {
-    let (profile, library) = match mcap::parse_record(op::HEADER, header) {
+    let (profile, library) = match parse_record(op::HEADER, header) {
         Ok(Record::Header(header)) => (header.profile, header.library),
         _ => (String::new(), String::new()),
     };
@@ -203,7 +204,7 @@ impl Copy {
 
     fn record<W: Write>(&mut self, writer: &mut NewLog<W>, opcode: u8, body: &[u8]) -> mcap::McapResult<()> {
         // What cannot be parsed is not there: where there is a checksum it has been looked at.
-        match mcap::parse_record(opcode, body) {
+        match parse_record(opcode, body) {
             Ok(Record::Schema { header, data }) => {
                 self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
             }

@@ -2,10 +2,9 @@
 
 use std::io::{Read, Seek, SeekFrom};
 
-use crc32fast::Hasher;
 use mcap::sans_io::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 
-use palpate::log::file::ChunkHead;
+use palpate::log::file::{ChunkHead, RecordStream, Section};
 
 /// What follows the start of the index in the footer and is under its checksum, the checksum itself, and the magic (bytes).
 const FOOTER_END: u64 = 8 + 4 + mcap::MAGIC.len() as u64;
@@ -32,26 +31,19 @@ pub(super) fn read_summary(source: &mut (impl Read + Seek)) -> Option<mcap::Summ
     reader.finish()
 }
 
-/// False if the index has a checksum that does not fit; `None` if it cannot be read.
+/// False if the index is damaged or holds what belongs to the data; `None` if it cannot be read.
 fn is_sound(source: &mut (impl Read + Seek), size: u64) -> Option<bool> {
     source.seek(SeekFrom::Start(size.checked_sub(FOOTER_END + 8)?)).ok()?;
-    let mut footer = [0; 8 + FOOTER_END as usize];
-    source.read_exact(&mut footer).ok()?;
-    let start = u64::from_le_bytes(*footer.first_chunk()?);
-    let expected = u32::from_le_bytes(*footer[16..].first_chunk()?);
-    if start == 0 || expected == 0 {
+    let mut start = [0; 8];
+    source.read_exact(&mut start).ok()?;
+    let start = u64::from_le_bytes(start);
+    if start == 0 {
         return Some(true);
     }
     source.seek(SeekFrom::Start(start)).ok()?;
-    let mut left = source.by_ref().take((size - 4 - mcap::MAGIC.len() as u64).checked_sub(start)?);
-    let mut checksum = Hasher::new();
-    let mut buffer = [0; 1 << 14];
-    loop {
-        match left.read(&mut buffer).ok()? {
-            0 => return Some(checksum.finalize() == expected),
-            read => checksum.update(&buffer[..read]),
-        }
-    }
+    let mut records = RecordStream::resume(source, start, Section::Index { data_has_checksum: false }, 0);
+    while records.read_next().is_some() {}
+    Some(records.damage().is_none())
 }
 
 /// The body of the record at `offset`, if it has this opcode.
