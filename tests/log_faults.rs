@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use palpate::Error;
 use palpate::actors::{LogFile, LogSink, LoggerActor, LoggerOutcome};
 use palpate::log::{
-    Environment, ForceSample, GroupInfo, GroupStats, LogEntry, LogReader, LogRecord, LoggedExecution, RunReport,
-    TextEvent,
+    Analysis, Environment, ForceSample, GroupInfo, GroupStats, LogEntry, LogReader, LogRecord, LoggedExecution,
+    RunReport, TextEvent,
 };
 use palpate::runtime::Nanos;
 use palpate::runtime::{
@@ -97,6 +97,32 @@ fn panics(there: usize, more: usize) -> io::Result<usize> {
     Ok(more)
 }
 
+/// Closed until it is opened.
+#[derive(Clone, Default)]
+struct Gate(Arc<(Mutex<bool>, std::sync::Condvar)>);
+
+impl Gate {
+    fn open(&self) {
+        *self.0.0.lock().unwrap() = true;
+        self.0.1.notify_all();
+    }
+}
+
+/// A disk that takes nothing until the gate is opened.
+struct Gated(Gate, Disk);
+
+impl Write for Gated {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let (is_open, opened) = &*self.0.0;
+        drop(opened.wait_while(is_open.lock().unwrap(), |is_open| !*is_open).unwrap());
+        self.1.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// How a run went.
 struct Ran {
     report: RunReport,
@@ -178,6 +204,9 @@ impl LogSink for Given {
     fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
         self.0.flush(log_time, now)
     }
+    fn ending(&mut self) {
+        self.0.ending();
+    }
     fn finish(&mut self) -> Result<(), Error> {
         self.0.finish()
     }
@@ -253,23 +282,10 @@ fn a_disk_of_20_kb_per_second_costs_records_within_bounds_of_memory_and_time() {
 // until the gate opens.
 #[test]
 fn a_gap_is_told_in_the_log_with_its_times() {
-    let gate = Arc::new((Mutex::new(false), std::sync::Condvar::new()));
-    struct Gate(Arc<(Mutex<bool>, std::sync::Condvar)>, Disk);
-    impl Write for Gate {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            let mut open = self.0.0.lock().unwrap();
-            while !*open {
-                open = self.0.1.wait(open).unwrap();
-            }
-            self.1.write(bytes)
-        }
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
+    let gate = Gate::default();
     let disk = Disk::new(healthy);
     let environment = environment(Execution::Threaded);
-    let mut file = LogFile::new(Gate(Arc::clone(&gate), disk.clone()), "disk", &environment).unwrap();
+    let mut file = LogFile::new(Gated(gate.clone(), disk.clone()), "disk", &environment).unwrap();
     let record = |n: u64| {
         let noise = |k: u64| f64::from_bits((n * 31 + k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 2);
         LogRecord::Force(ForceSample {
@@ -287,8 +303,7 @@ fn a_gap_is_told_in_the_log_with_its_times() {
         n += 1;
     }
     assert_eq!(file.take_loss(), None, "the gap is not over");
-    *gate.0.lock().unwrap() = true;
-    gate.1.notify_all();
+    gate.open();
     let begun = Instant::now();
     let loss = loop {
         file.record(&record(n)).unwrap();
@@ -322,6 +337,50 @@ fn a_gap_is_told_in_the_log_with_its_times() {
         expected += 1;
     }
     assert!(first_lost.is_some() && loss.records > most / 4);
+}
+
+// Check that the end of the log says so itself: the disk takes nothing until the run is over, and then everything.
+#[test]
+fn a_gap_that_is_open_at_the_end_of_a_run_is_told_in_the_log() {
+    struct OpensAtTheEnd(LogFile, Gate);
+    impl LogSink for OpensAtTheEnd {
+        fn record(&mut self, record: &LogRecord) -> Result<(), Error> {
+            self.0.record(record)
+        }
+        fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
+            self.0.text(event)
+        }
+        fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
+            self.0.stats(stats)
+        }
+        fn environment(&mut self, environment: &Environment) {
+            self.0.environment(environment);
+        }
+        fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
+            self.0.flush(log_time, now)
+        }
+        fn ending(&mut self) {
+            self.0.ending();
+        }
+        fn finish(&mut self) -> Result<(), Error> {
+            self.1.open();
+            self.0.finish()
+        }
+        fn take_loss(&mut self) -> Option<palpate::actors::Loss> {
+            self.0.take_loss()
+        }
+    }
+    let (gate, disk) = (Gate::default(), Disk::new(healthy));
+    // The log of a run in real time does not wait for its disk; that the run is in simulated time makes the test short.
+    let file = LogFile::new(Gated(gate.clone(), disk.clone()), "disk", &environment(Execution::Threaded)).unwrap();
+    let ran = run(Execution::Virtual, 15_000, 4000, Some(Box::new(OpensAtTheEnd(file, gate))));
+    let (got, damage) = disk.read();
+    assert_eq!((damage, ran.error.is_none()), (None, true), "{:?}", ran.error);
+    let mut read = Analysis::default();
+    got.iter().for_each(|entry| read.push_entry(entry));
+    let (read, lost) = (read.report(), ran.report.lost_records());
+    assert!(lost > 0 && read.lost_records() == lost, "{lost} lost, {} by the log", read.lost_records());
+    assert!(read.events.iter().any(|event| event.message.contains("records lost between")), "{:?}", read.events);
 }
 
 #[test]

@@ -38,6 +38,8 @@ pub struct LogFile {
     newest: Mark,
     /// Records are dropped until the disk has caught up.
     is_full: bool,
+    /// Nothing is dropped for want of room any more: what is still told is little.
+    is_ending: bool,
     finished: bool,
     gap: Option<Loss>,
     closed_gap: Option<Loss>,
@@ -130,6 +132,7 @@ impl LogFile {
             safe: Mark::default(),
             newest: Mark::default(),
             is_full: false,
+            is_ending: false,
             finished: false,
             gap: None,
             closed_gap: None,
@@ -159,6 +162,9 @@ impl LogFile {
     /// True unless records are to be dropped.
     fn has_room(&mut self) -> Result<bool, Error> {
         let waiting = self.disk.waiting();
+        if self.is_ending {
+            return Ok(true);
+        }
         if self.waits {
             // One block at a time: nothing is lost here, however slow the disk is.
             if waiting > LogFile::MOST_WAITING && !self.disk.wait_for(LogFile::MOST_WAITING / 2, STALLED, Duration::MAX)
@@ -169,9 +175,16 @@ impl LogFile {
         }
         self.is_full = waiting > if self.is_full { LogFile::MOST_WAITING / 2 } else { LogFile::MOST_WAITING };
         if !self.is_full {
-            self.closed_gap = self.gap.take().or(self.closed_gap.take());
+            self.close_gap();
         }
         Ok(!self.is_full)
+    }
+
+    /// One that nobody has taken yet becomes one with it.
+    fn close_gap(&mut self) {
+        if let Some(gap) = self.gap.take() {
+            self.closed_gap = Some(self.closed_gap.map_or(gap, |before| before.and(gap)));
+        }
     }
 
     /// Notes which records the bytes given so far hold, and which of them are safe.
@@ -194,8 +207,8 @@ impl LogFile {
                 Some(_) => "the disk does not keep up",
                 None => "the log was given up",
             };
-            let gap = self.gap.get_or_insert(Loss { records: 0, from, to, why });
-            *gap = Loss { records: gap.records + records, from: gap.from.min(from), to: gap.to.max(to), why };
+            let loss = Loss { records, from, to, why };
+            self.gap = Some(self.gap.map_or(loss, |gap| gap.and(loss)));
         }
     }
 
@@ -269,6 +282,11 @@ impl LogSink for LogFile {
         Ok(())
     }
 
+    fn ending(&mut self) {
+        self.is_ending = true;
+        self.close_gap();
+    }
+
     fn finish(&mut self) -> Result<(), Error> {
         let result = match self.writer.take() {
             Some(writer) => self.close(writer).map_err(|error| self.give_up(error)),
@@ -281,5 +299,21 @@ impl LogSink for LogFile {
     fn take_loss(&mut self) -> Option<Loss> {
         // A gap is told when it is over, or when nothing more will come.
         self.closed_gap.take().or_else(|| self.gap.take_if(|_| self.finished))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_gaps_that_end_before_one_is_taken_become_one() {
+        let mut file = LogFile::new(io::sink(), "memory", &Environment::default()).unwrap();
+        for (records, from, to) in [(3, 10, 20), (4, 30, 50)] {
+            file.lose(records, Nanos(from), Nanos(to));
+            file.close_gap();
+        }
+        let loss = file.take_loss().map(|Loss { records, from, to, .. }| (records, from, to));
+        assert_eq!((loss, file.take_loss()), (Some((7, Nanos(10), Nanos(50))), None));
     }
 }

@@ -45,6 +45,9 @@ pub trait LogSink: Send {
     /// As [`record`](Self::record).
     fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error>;
 
+    /// Nothing more was recorded: what follows is told at any rate, and what was lost until now is a gap that is over.
+    fn ending(&mut self) {}
+
     /// Ends the log.
     ///
     /// # Errors
@@ -71,6 +74,12 @@ pub struct Loss {
 }
 
 impl Loss {
+    /// Both as one.
+    pub(super) fn and(self, later: Self) -> Self {
+        let (from, to) = (self.from.min(later.from), self.to.max(later.to));
+        Self { records: self.records + later.records, from, to, ..later }
+    }
+
     /// As an event of the log.
     pub(super) fn in_words(&self) -> TextEvent {
         let Self { records, from, to, why } = *self;

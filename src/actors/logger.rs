@@ -315,6 +315,13 @@ impl Actor for LoggerActor {
     fn stop(&mut self, ctx: &TickContext) {
         self.learn(ctx.now);
         self.take_records(ctx, true);
+        if !self.sink_failed {
+            self.keep(|sink| {
+                sink.ending();
+                Ok(())
+            });
+        }
+        self.take_loss();
         for counter in std::mem::take(&mut self.stats) {
             let stats = counter.finish(self.log_time);
             self.keep(|sink| sink.stats(&stats));

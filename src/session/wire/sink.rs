@@ -72,6 +72,10 @@ impl LogSink for Sinks {
         self.on_file(|file| file.flush(log_time, now))
     }
 
+    fn ending(&mut self) {
+        self.file.iter_mut().for_each(LogFile::ending);
+    }
+
     fn finish(&mut self) -> Result<(), Error> {
         self.on_file(LogFile::finish)
     }
