@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use palpate::log::{Environment, GroupInfo, GroupStats, LogRecord, McapWriter};
+use palpate::runtime::TickTiming;
 use serde_json::Value;
 
 use crate::support::Folder;
@@ -66,6 +68,23 @@ fn parts_add_up_to_the_whole_and_a_group_stands_alone() {
     let alone = figures(&["--group", "global"]);
     assert_eq!(alone["global.execution.p99"], whole["global.execution.p99"]);
     assert!(!alone.keys().any(|name| name.starts_with("local.")));
+}
+
+#[test]
+fn what_was_lost_is_told_of_whichever_group_is_looked_at() {
+    let folder = Folder::new();
+    let groups = ["local", "global"].map(|name| GroupInfo::new(name, 1000.0)).into();
+    let environment = Environment { groups, ..Environment::default() };
+    let mut writer = McapWriter::create(&folder.path("a.mcap"), &environment).unwrap();
+    writer.write_stats(&GroupStats { group: 0, lost_records: 7, ..GroupStats::default() }).unwrap();
+    for group in [0, 1] {
+        writer.write(&LogRecord::Tick(TickTiming { group, ..TickTiming::default() })).unwrap();
+    }
+    writer.finish().unwrap();
+    for group in ["local", "global"] {
+        let report = json(&folder.succeed(&["timing", "a.mcap", "--json", "--group", group]));
+        assert_eq!((&report["lost_records"], &report["verdict"]), (&7.into(), &"INCOMPLETE".into()), "{group}");
+    }
 }
 
 #[test]

@@ -202,7 +202,11 @@ impl TimingAnalysis {
         }
         // A core is as busy as it is, whichever group is looked at.
         let cores = cores(&run, &environment, span);
+        let lost = run.lost_records();
         run.groups.retain(|group| self.selection.has_group(&group.name));
+        // Whose records were lost is not known: the first group has the sum, whichever that is.
+        let hidden = lost.saturating_sub(run.lost_records());
+        run.groups.first_mut().into_iter().for_each(|first| first.lost_records += hidden);
         groups.retain(|group| self.selection.has_group(&group.name));
         let mut devices = Vec::new();
         for (number, device) in (0..).zip(&run.devices) {
