@@ -1,7 +1,7 @@
 //! The one line that a report begins with.
 
 use super::units::plural;
-use crate::log::{Level, RunReport, TextEvent};
+use crate::log::{Level, RunReport};
 
 /// The verdict on a run, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,16 +42,12 @@ impl RunReport {
         let ran = format!("{:.3} s of {time}", self.duration.as_secs_f64());
         let (skipped, missed, lost) = (self.skipped(), self.missed(), self.lost_records());
         if self.worst_event == Some(Level::Error) {
-            let errors = || self.events.iter().filter(|event| event.level == Level::Error);
-            let first = errors().find(|event| restart_after(self, event).is_none());
-            if first.is_none()
-                && let Some(restart) = errors().next_back().and_then(|event| restart_after(self, event))
-            {
+            if let (None, Some(restart)) = (&self.fault, &self.restart) {
                 let (skipped, missed) = (plural(skipped, "period", "periods"), plural(missed, "deadline", "deadlines"));
                 let restart = &restart.message;
                 return (RunVerdict::Restarted, format!("{restart}; {skipped} skipped and {missed} missed in {ran}"));
             }
-            let reason = first.map_or("an actor failed".to_owned(), |event| event.message.clone());
+            let reason = self.fault.as_ref().map_or("an actor failed", |fault| &fault.message);
             return (RunVerdict::Failed, format!("{reason}, in {ran}"));
         }
         if skipped > 0 || missed > 0 {
@@ -76,23 +72,14 @@ impl RunReport {
     }
 }
 
-/// The restart that answered a fault: the first of the same group at its time or later.
-fn restart_after<'a>(report: &'a RunReport, fault: &TextEvent) -> Option<&'a TextEvent> {
-    let group = fault.message.split_once(": ")?.0;
-    report.events.iter().find(|event| {
-        let rest = event.message.strip_prefix(group);
-        event.time >= fault.time && rest.is_some_and(|rest| rest.starts_with(": restarted after a fault"))
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::{Analysis, Environment, LogRecord};
+    use crate::log::{Analysis, Environment, LogRecord, TextEvent};
     use crate::runtime::Nanos;
     use crate::runtime::{SlipCause, TickTiming};
 
-    fn report(slips: u32) -> RunReport {
+    fn analysis(slips: u32) -> Analysis {
         let mut analysis = Analysis::default();
         analysis.set_environment(&Environment::default());
         analysis.push(&LogRecord::Tick(TickTiming {
@@ -103,7 +90,11 @@ mod tests {
             deadline: Nanos(1_501_000_000),
             ..TickTiming::default()
         }));
-        analysis.report()
+        analysis
+    }
+
+    fn report(slips: u32) -> RunReport {
+        analysis(slips).report()
     }
 
     #[test]
@@ -121,18 +112,43 @@ mod tests {
         assert_eq!(both.verdict().0, RunVerdict::Failed);
     }
 
+    fn after(events: Vec<TextEvent>) -> (RunVerdict, String) {
+        let mut analysis = analysis(3);
+        events.iter().for_each(|event| analysis.push_text(event));
+        analysis.report().verdict()
+    }
+
+    fn event(s: u64, level: Level, message: &str) -> TextEvent {
+        TextEvent { time: Nanos(s), level, message: message.to_owned() }
+    }
+
+    fn panicked(s: u64, group: &str) -> TextEvent {
+        event(s, Level::Error, &format!("{group}: actor 0 panicked"))
+    }
+
+    fn restarted(s: u64, group: &str) -> TextEvent {
+        event(s, Level::Warning, &format!("{group}: restarted after a fault, restart 1"))
+    }
+
     #[test]
     fn a_fault_that_a_restart_answered_is_told_from_one_that_ended_the_run() {
-        let event = |s: u64, level, message: &str| TextEvent { time: Nanos(s), level, message: message.to_owned() };
-        let restarted = event(6, Level::Warning, "global: restarted after a fault, restart 1");
-        let with = |events: Vec<TextEvent>| RunReport { worst_event: Some(Level::Error), events, ..report(3) };
-        let panicked = |s, group: &str| event(s, Level::Error, &format!("{group}: actor 0 panicked"));
-        let (found, why) = with(vec![panicked(5, "global"), restarted.clone()]).verdict();
+        let (found, why) = after(vec![panicked(5, "global"), restarted(6, "global")]);
         assert_eq!(found, RunVerdict::Restarted);
         assert!(why.starts_with("global: restarted after a fault, restart 1; 3 periods skipped"), "{why}");
         // Check that neither another group's restart nor an earlier one answers a fault
-        for fault in [panicked(5, "local"), panicked(7, "global")] {
-            assert_eq!(with(vec![fault, restarted.clone()]).verdict().0, RunVerdict::Failed);
-        }
+        assert_eq!(after(vec![panicked(5, "local"), restarted(6, "global")]).0, RunVerdict::Failed);
+        assert_eq!(after(vec![restarted(6, "global"), panicked(7, "global")]).0, RunVerdict::Failed);
+        assert_eq!(after(vec![panicked(7, "global"), restarted(6, "global")]).0, RunVerdict::Failed);
+    }
+
+    #[test]
+    fn a_fault_counts_however_many_events_were_before_it() {
+        let warnings = (0..500).map(|s| event(s, Level::Warning, "local: degraded, cause 1"));
+        let (found, why) = after(warnings.chain([panicked(500, "local")]).collect());
+        assert_eq!((found, why.as_str()), (RunVerdict::Failed, "local: actor 0 panicked, in 1.500 s of virtual time"));
+        let restarts = (0..500).flat_map(|s| [panicked(s, "global"), restarted(s, "global")]);
+        assert_eq!(after(restarts.clone().collect()).0, RunVerdict::Restarted);
+        let (found, why) = after(restarts.chain([panicked(500, "global")]).collect());
+        assert_eq!((found, why.as_str()), (RunVerdict::Failed, "global: actor 0 panicked, in 1.500 s of virtual time"));
     }
 }

@@ -1,10 +1,12 @@
 //! What happened in a run, from its records, in one pass.
 
+mod faults;
 mod group;
 mod haptics;
 
 use std::collections::BTreeMap;
 
+use self::faults::Faults;
 pub use self::group::{GroupCounter, GroupSummary, TickFigures, TickGauge};
 use self::haptics::HapticsCounter;
 pub use self::haptics::{
@@ -35,6 +37,10 @@ pub struct RunReport {
     pub event_count: u64,
     /// The gravest event.
     pub worst_event: Option<Level>,
+    /// The first fault that no restart answered.
+    pub fault: Option<TextEvent>,
+    /// The last restart of a rate group.
+    pub restart: Option<TextEvent>,
     /// The damage of the log that the records came from; set by whoever read it.
     pub damage: Option<String>,
     /// The number of messages in the log by topic; set by whoever read it.
@@ -100,8 +106,8 @@ pub struct Analysis {
     groups: BTreeMap<u16, GroupCounter>,
     /// By device.
     haptics: BTreeMap<u16, HapticsCounter>,
-    coded_events: Vec<Event>,
     events: Vec<TextEvent>,
+    faults: Faults,
     event_count: u64,
     worst_event: Option<Level>,
 }
@@ -166,6 +172,7 @@ impl Analysis {
     pub fn push_text(&mut self, event: &TextEvent) {
         self.event_count += 1;
         self.worst_event = self.worst_event.max(Some(event.level));
+        self.faults.push(event);
         if self.events.len() < EVENTS_KEPT {
             self.events.push(event.clone());
         }
@@ -212,11 +219,8 @@ impl Analysis {
         let rate =
             |group: u16| environment.groups.get(usize::from(group)).map(|info| info.rate_hz).filter(|hz| *hz > 0.0);
         let groups = groups.iter().map(|(&id, counter)| counter.report(environment.group_name(id), rate(id))).collect();
-        let described = |event: &Event| TextEvent::describe(event, &environment.group_name(event.group));
-        let mut events: Vec<TextEvent> =
-            self.events.iter().cloned().chain(self.coded_events.iter().map(described)).collect();
+        let mut events = self.events.clone();
         events.sort_by_key(|event| event.time);
-        events.truncate(EVENTS_KEPT);
         RunReport {
             environment: self.environment.clone(),
             duration: self.duration,
@@ -225,6 +229,8 @@ impl Analysis {
             events,
             event_count: self.event_count,
             worst_event: self.worst_event,
+            fault: self.faults.first(),
+            restart: self.faults.restart(),
             damage: None,
             messages: BTreeMap::new(),
         }
@@ -241,11 +247,11 @@ impl Analysis {
     }
 
     fn push_event(&mut self, event: &Event) {
-        self.event_count += 1;
-        self.worst_event = self.worst_event.max(Some(TextEvent::describe(event, "").level));
-        if self.coded_events.len() < EVENTS_KEPT {
-            self.coded_events.push(*event);
-        }
+        let name = self.environment.as_ref().map_or_else(
+            || Environment::default().group_name(event.group),
+            |environment| environment.group_name(event.group),
+        );
+        self.push_text(&TextEvent::describe(event, &name));
     }
 }
 
