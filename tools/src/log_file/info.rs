@@ -152,8 +152,15 @@ impl LogInfo {
             .collect();
         let mut metadata: Vec<_> = index.metadata_indexes.iter().collect();
         metadata.sort_by_key(|entry| entry.offset);
+        let mut end = 0;
         for entry in metadata {
-            info.metadata(op::METADATA, &record_at(source, entry.offset, op::METADATA)?);
+            // Records within records would have the file read for each of them.
+            if entry.offset < end {
+                return None;
+            }
+            let body = record_at(source, entry.offset, op::METADATA)?;
+            end = entry.offset.saturating_add(body.len() as u64);
+            info.metadata(op::METADATA, &body);
         }
         Some(info)
     }

@@ -3,7 +3,7 @@
 //! Messages are copied as they are: channel, times, sequence number and bytes. Channels that a damage took are taken from
 //! the index at the end of the file, if that is there.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::io::{Read, Seek, Write};
 use std::path::Path;
 
@@ -73,13 +73,12 @@ pub fn recover<W: Write>(
     mut progress: impl FnMut(u64, u64),
 ) -> Result<(Recovered, W), Error> {
     let index = read_summary(&mut source);
-    let mut late = Late::of(&mut source, index.as_ref());
-    let mut records = Salvage::new(source, place)?;
+    let mut hidden = listed(index.as_ref());
+    let mut records = Salvage::new(&mut source, place)?;
     let failed = |e| cannot_write(new_place, e);
     let mut copy = Copy::new(index.unwrap_or_default());
     copy.report.bytes = records.length();
     let (mut output, mut new) = (Some(output), None);
-    let mut chunk = None;
     while let Some(found) = records.next() {
         let (opcode, stream) = match found {
             Found::Record(opcode, stream) => (opcode, stream),
@@ -94,25 +93,42 @@ pub fn recover<W: Write>(
             new = Some(begin(output, if opcode == op::HEADER { stream.body() } else { &[] }).map_err(failed)?);
         }
         let Some(writer) = new.as_mut().filter(|_| opcode != op::HEADER) else { continue };
-        if start != chunk {
+        if start != copy.chunk {
             // The new log has the chunks of the old one.
             writer.flush().map_err(failed)?;
             copy.report.chunks += u64::from(start.is_some());
             copy.since_chunk = 0;
-            chunk = start;
+            copy.chunk = start;
             progress(stream.offset(), copy.report.bytes);
         }
-        late.forget(record_start);
-        copy.record(writer, opcode, stream.body()).map_err(failed)?;
+        hidden.remove(&record_start);
+        match parse_record(opcode, stream.body()) {
+            Ok(record) => copy.record(writer, record).map_err(failed)?,
+            Err(what) => {
+                // Of a record in a chunk, no more than the chunk has.
+                let to = (record_start + 9 + stream.body().len() as u64).min(stream.offset());
+                copy.note_record(Damage { from: record_start, to, what: format!("a record does not decode: {what}") });
+            }
+        }
     }
+    drop(records);
     let mut writer = match (output, new) {
         (Some(output), _) => begin(output, &[]).map_err(failed)?,
         (None, Some(new)) => new,
         (None, None) => unreachable!("the output is in one of the two"),
     };
-    // What the index knows of and a damage hid.
-    for (opcode, body) in std::mem::take(&mut late.bodies).into_values() {
-        copy.record(&mut writer, opcode, &body).map_err(failed)?;
+    // What the index knows of and a damage hid. What it says of other places is wrong, and so are records within records.
+    let mut end = 0;
+    for (offset, opcode) in hidden {
+        if offset >= end
+            && copy.is_lost(offset)
+            && let Some(body) = record_at(&mut source, offset, opcode)
+        {
+            end = offset + 9 + body.len() as u64;
+            if let Ok(record) = parse_record(opcode, &body) {
+                copy.record(&mut writer, record).map_err(failed)?;
+            }
+        }
     }
     copy.declare_all(&mut writer).map_err(failed)?;
     writer.finish().map_err(failed)?;
@@ -148,24 +164,12 @@ fn begin<W: Write>(output: W, header: &[u8]) -> mcap::McapResult<NewLog<W>> {
     options.create(NoSeek::new(output))
 }
 
-/// Attachments and metadata that the index lists, until they are met in the file itself.
-#[derive(Default)]
-struct Late {
-    bodies: std::collections::BTreeMap<u64, (u8, Vec<u8>)>,
-}
-
-impl Late {
-    fn of(source: &mut (impl Read + Seek), index: Option<&Summary>) -> Self {
-        let Some(index) = index else { return Self::default() };
-        let attachments = index.attachment_indexes.iter().map(|entry| (entry.offset, op::ATTACHMENT));
-        let metadata = index.metadata_indexes.iter().map(|entry| (entry.offset, op::METADATA));
-        let read = |(offset, opcode)| Some((offset, (opcode, record_at(source, offset, opcode)?)));
-        Self { bodies: attachments.chain(metadata).filter_map(read).collect() }
-    }
-
-    fn forget(&mut self, start: u64) {
-        self.bodies.remove(&start);
-    }
+/// The places of the attachments and metadata that the index lists, and their opcodes.
+fn listed(index: Option<&Summary>) -> BTreeMap<u64, u8> {
+    let Some(index) = index else { return BTreeMap::new() };
+    let attachments = index.attachment_indexes.iter().map(|entry| (entry.offset, op::ATTACHMENT));
+    let metadata = index.metadata_indexes.iter().map(|entry| (entry.offset, op::METADATA));
+    attachments.chain(metadata).collect()
 }
 
 /// What has been copied so far.
@@ -177,6 +181,8 @@ struct Copy {
     declared: HashSet<u16>,
     span: Span,
     newest: Option<u64>,
+    /// Where the chunk begins that the last record was in.
+    chunk: Option<u64>,
     /// Messages since the chunk began.
     since_chunk: u64,
 }
@@ -192,29 +198,47 @@ impl Copy {
             declared: HashSet::new(),
             span: Span::default(),
             newest: None,
+            chunk: None,
             since_chunk: 0,
         }
     }
 
     fn note(&mut self, damage: Damage) {
-        let saved = if damage.what.contains("cut off") { self.since_chunk } else { 0 };
+        let saved = if self.chunk == Some(damage.from) { self.since_chunk } else { 0 };
         self.report.lost.push(Lost { damage, after: self.newest, before: None, saved });
         self.since_chunk = 0;
     }
 
-    fn record<W: Write>(&mut self, writer: &mut NewLog<W>, opcode: u8, body: &[u8]) -> mcap::McapResult<()> {
-        // What cannot be parsed is not there: where there is a checksum it has been looked at.
-        match parse_record(opcode, body) {
-            Ok(Record::Schema { header, data }) => {
+    /// Notes a record that is whole but does not decode, together with what is wrong alike just before it.
+    fn note_record(&mut self, damage: Damage) {
+        match self.report.lost.last_mut() {
+            Some(Lost { damage: last, before: None, saved: 0, .. })
+                if last.what == damage.what && damage.from <= last.to =>
+            {
+                last.to = last.to.max(damage.to);
+            }
+            _ => self.report.lost.push(Lost { damage, after: self.newest, before: None, saved: 0 }),
+        }
+    }
+
+    /// True for a place in what was lost.
+    fn is_lost(&self, place: u64) -> bool {
+        let begun = self.report.lost.partition_point(|lost| lost.damage.from <= place);
+        self.report.lost[..begun].last().is_some_and(|lost| place < lost.damage.to)
+    }
+
+    fn record<W: Write>(&mut self, writer: &mut NewLog<W>, record: Record<'_>) -> mcap::McapResult<()> {
+        match record {
+            Record::Schema { header, data } => {
                 self.schemas.insert(header.id, (header.name, header.encoding, data.into_owned()));
             }
-            Ok(Record::Message { header, data }) => self.message(writer, &header, &data)?,
-            Ok(Record::Channel(channel)) => self.declare(writer, &channel)?,
-            Ok(Record::Metadata(metadata)) => {
+            Record::Message { header, data } => self.message(writer, &header, &data)?,
+            Record::Channel(channel) => self.declare(writer, &channel)?,
+            Record::Metadata(metadata) => {
                 writer.write_metadata(&metadata)?;
                 self.report.metadata += 1;
             }
-            Ok(Record::Attachment { header, data, .. }) => {
+            Record::Attachment { header, data, .. } => {
                 let AttachmentHeader { log_time, create_time, name, media_type } = header;
                 writer.attach(&Attachment { log_time, create_time, name, media_type, data })?;
                 self.report.attachments += 1;

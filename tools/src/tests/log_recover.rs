@@ -1,9 +1,10 @@
 //! A damaged log is read up to the damage and recovered behind it: cut at every 4 KiB boundary, and with wrong bits anywhere.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::Cursor;
+use std::io::{Cursor, Read, Seek, SeekFrom};
 
 use crate::log_file::{LogInfo, Recovered, check, recover};
+use mcap::records::op;
 use palpate::log::{GroupStats, LogEntry, LogReader, LogRecord};
 use palpate::runtime::{Record, TickTiming};
 use proptest::prelude::*;
@@ -260,4 +261,80 @@ proptest! {
             }
         }
     }
+}
+
+/// A record of an MCAP file.
+fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+    [&[opcode], &(body.len() as u64).to_le_bytes()[..], body].concat()
+}
+
+/// The header of a log.
+fn head() -> Vec<u8> {
+    [mcap::MAGIC, &record(op::HEADER, &[0; 8])].concat()
+}
+
+#[test]
+fn an_attachment_with_a_wrong_checksum_is_named_as_lost() {
+    // 68 bytes behind times and names, and a checksum that is not theirs.
+    let body = [[0; 24].as_slice(), &68_u64.to_le_bytes(), &[0; 68], &[1, 0, 0, 0]].concat();
+    let log = [head(), record(op::ATTACHMENT, &body), record(op::DATA_END, &[0; 4]), record(op::FOOTER, &[0; 20])];
+    let bytes = [log.concat().as_slice(), mcap::MAGIC].concat();
+    let (report, _) = recovered(&bytes);
+    assert_eq!((report.attachments, report.lost.len(), report.lost_bytes()), (0, 1, 113), "{report:?}");
+    assert!(report.lost[0].damage.what.contains("a record does not decode"), "{report:?}");
+}
+
+// Check that messages of a chunk before it are not taken for messages of the record that is cut.
+#[test]
+fn a_record_that_is_cut_behind_a_chunk_is_lost_with_all_of_its_bytes() {
+    let bytes = long_log();
+    let (at, length) = *chunks(&bytes).last().unwrap();
+    let metadata = record(op::METADATA, &[0; 100]);
+    let cut = [&bytes[..at + length], &metadata[..60]].concat();
+    let (report, _) = recovered(&cut);
+    assert_eq!((report.lost.len(), report.lost[0].saved, report.lost_bytes()), (1, 0, 60), "{report:?}");
+}
+
+/// Counts the bytes read of a file.
+struct Counted<'a>(Cursor<&'a [u8]>, &'a mut u64);
+
+impl Read for Counted<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let count = self.0.read(buffer)?;
+        *self.1 += count as u64;
+        Ok(count)
+    }
+}
+
+impl Seek for Counted<'_> {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        self.0.seek(to)
+    }
+}
+
+// Check that an index of a thousand records, each of which claims the rest of the file, does not have the file read for each.
+#[test]
+fn records_within_records_that_an_index_lists_are_read_once() {
+    let (heads, start) = (1000, head().len() as u64);
+    let mut data = head();
+    let length = 9 * heads;
+    for number in 1..=heads {
+        data.push(op::METADATA);
+        data.extend((length - 9 * number).to_le_bytes());
+    }
+    data.extend(record(op::DATA_END, &[0; 4]));
+    let index_at = data.len() as u64;
+    for number in 0..heads {
+        let place = [start + 9 * number, 0].map(u64::to_le_bytes).concat();
+        data.extend(record(op::METADATA_INDEX, &[place.as_slice(), &[0; 4]].concat()));
+    }
+    data.extend(record(op::STATISTICS, &[0; 46]));
+    data.extend(record(op::FOOTER, &[index_at.to_le_bytes().as_slice(), &[0; 12]].concat()));
+    data.extend(mcap::MAGIC);
+    let (size, mut read) = (data.len() as u64, 0);
+    LogInfo::of(Counted(Cursor::new(&data), &mut read), "memory", |_, _| ()).unwrap();
+    assert!(read < 5 * size, "{read} bytes of {size}");
+    read = 0;
+    recover(Counted(Cursor::new(&data), &mut read), "old", Vec::new(), "new", |_, _| ()).unwrap();
+    assert!(read < 5 * size, "{read} bytes of {size}");
 }
