@@ -7,7 +7,8 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use mcap::records::{MessageHeader, op};
-use palpate::log::{Environment, GroupInfo, GroupStats, McapWriter};
+use palpate::log::{Environment, GroupInfo, GroupStats, LogRecord, McapWriter, Resync};
+use palpate::runtime::TickTiming;
 
 use support::{Folder, SCENE};
 
@@ -284,5 +285,24 @@ fn an_attachment_without_room_for_its_checksum_is_damage() {
         }
         let called = folder.call(&["log", "check", "short.mcap"]);
         assert!(called.out.contains("an attachment ends before its checksum"), "{called:?}");
+    }
+}
+
+#[test]
+fn numbers_that_no_group_and_no_device_has_are_damage() {
+    let folder = Folder::new();
+    let of_group = TickTiming { group: u16::MAX, ..TickTiming::default() };
+    let of_device = Resync { device: u16::MAX, ..Resync::default() };
+    for (record, words) in [
+        (LogRecord::Tick(of_group), "it is of rate group 65535, of at most 1024"),
+        (LogRecord::Resync(of_device), "it is of device 65535, of at most 8"),
+    ] {
+        let mut writer = McapWriter::create(&folder.path("wrong.mcap"), &Environment::default()).unwrap();
+        writer.write(&record).unwrap();
+        writer.finish().unwrap();
+        let called = folder.call(&["timing", "wrong.mcap"]);
+        assert!(called.err.contains(words), "{called:?}");
+        let called = folder.call(&["log", "check", "wrong.mcap"]);
+        assert!(called.code == Some(1) && called.out.contains(words), "{called:?}");
     }
 }

@@ -19,7 +19,7 @@ pub use self::parsed::parse_record;
 use super::entry::LogEntry;
 pub use super::messages::topic::{Topic, TopicKind};
 use super::messages::{self, LogMessage, foxglove};
-use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, MAX_GROUPS, SCHEMA_VERSION_KEY};
+use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, MAX_DEVICES, MAX_GROUPS, SCHEMA_VERSION_KEY};
 use crate::error::{Error, ErrorKind};
 
 /// Logs before it have other messages on `/tool` and `/log`.
@@ -255,8 +255,10 @@ impl<R: Read> LogReader<R> {
         if kind == TopicKind::Contact {
             // The places come first, as they were recorded.
             let contact = messages::Contact::decode(&data).map_err(|e| damaged(&e))?;
-            let records = contact.points().map(LogRecord::ContactPoint).chain([LogRecord::Contact(contact.sample())]);
-            self.left.extend(records.map(LogEntry::Record));
+            let sample = LogEntry::Record(LogRecord::Contact(contact.sample()));
+            sample.is_of_a_run().map_err(|e| damaged(&e))?;
+            let points = contact.points().map(|point| LogEntry::Record(LogRecord::ContactPoint(point)));
+            self.left.extend(points.chain([sample]));
             return Ok(self.left.pop_front());
         }
         if kind == TopicKind::Scene && self.has_scene {
@@ -320,7 +322,29 @@ impl LogEntry {
     /// # Errors
     /// What is damaged, in a line.
     pub fn decode(kind: TopicKind, data: &[u8]) -> Result<Option<Self>, String> {
-        Self::of_message(kind, data).map_err(|error| error.to_string())
+        let entry = Self::of_message(kind, data).map_err(|error| error.to_string())?;
+        entry.as_ref().map_or(Ok(()), Self::is_of_a_run)?;
+        Ok(entry)
+    }
+
+    /// Refuses numbers that no group and no device of a run has: there are sums for each of them.
+    fn is_of_a_run(&self) -> Result<(), String> {
+        let (group, device) = match self {
+            Self::Stats(stats) => (stats.group, 0),
+            Self::Record(LogRecord::Tick(r)) => (r.group, 0),
+            Self::Record(LogRecord::Actors(r)) => (r.group, 0),
+            Self::Record(LogRecord::Port(r)) => (r.group, 0),
+            Self::Record(LogRecord::Input(r)) => (r.group, 0),
+            Self::Record(record) => (0, record.device()),
+            _ => (0, 0),
+        };
+        if usize::from(group) >= MAX_GROUPS {
+            return Err(format!("it is of rate group {group}, of at most {MAX_GROUPS}"));
+        }
+        if device >= MAX_DEVICES {
+            return Err(format!("it is of device {device}, of at most {MAX_DEVICES}"));
+        }
+        Ok(())
     }
 
     fn of_message(kind: TopicKind, data: &[u8]) -> Result<Option<Self>, prost::DecodeError> {
