@@ -306,3 +306,37 @@ fn numbers_that_no_group_and_no_device_has_are_damage() {
         assert!(called.code == Some(1) && called.out.contains(words), "{called:?}");
     }
 }
+
+#[test]
+fn a_topic_with_a_long_name_and_many_messages_is_read_as_fast_as_it_is_long() {
+    let folder = Folder::new();
+    let mut bytes = Vec::new();
+    let mut writer = mcap::Writer::new(std::io::Cursor::new(&mut bytes)).unwrap();
+    let channel_id = writer.add_channel(0, &"x".repeat(20_000_000), "json", &BTreeMap::new()).unwrap();
+    for sequence in 0..100_000 {
+        let header = MessageHeader { channel_id, sequence, log_time: 0, publish_time: 0 };
+        writer.write_to_known_channel(&header, b"{}").unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    folder.write("long.mcap", bytes);
+    let (code, out) = in_time(&folder, &["timing", "long.mcap"]);
+    assert_eq!(code, Some(0), "{out}");
+}
+
+#[test]
+fn a_schema_of_many_channels_is_looked_at_once() {
+    let folder = Folder::new();
+    let mut bytes = Vec::new();
+    let mut writer = mcap::Writer::new(std::io::Cursor::new(&mut bytes)).unwrap();
+    // A name with a field of palpate's own is looked for in all of it.
+    let schema = writer.add_schema("foxglove.Log", "protobuf", &vec![0; 10_000_000]).unwrap();
+    for channel in 0..20_000 {
+        writer.add_channel(schema, &format!("/{channel}"), "protobuf", &BTreeMap::new()).unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    folder.write("many.mcap", bytes);
+    let (code, out) = in_time(&folder, &["timing", "many.mcap"]);
+    assert_eq!(code, Some(0), "{out}");
+}

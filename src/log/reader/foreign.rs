@@ -17,6 +17,7 @@
 //! taken from the first two releases.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use prost::Message;
 use prost::encoding::{WireType, decode_key, decode_varint};
@@ -47,7 +48,22 @@ type Values = [Option<u64>; FIELDS.len()];
 enum Encoding {
     Json,
     /// The place in [`FIELDS`] by field number.
-    Protobuf(BTreeMap<u32, usize>),
+    Protobuf(Arc<BTreeMap<u32, usize>>),
+}
+
+/// A schema, as far as tick timing goes.
+#[derive(Clone, Debug)]
+pub(super) struct ForeignSchema {
+    is_named: bool,
+    /// Those of a protobuf message that has what is required.
+    numbers: Option<Arc<BTreeMap<u32, usize>>>,
+}
+
+impl ForeignSchema {
+    /// The schema `name`; `descriptors` are looked at once for all of its channels.
+    pub(super) fn of(name: &str, descriptors: &[u8]) -> Self {
+        Self { is_named: name.ends_with("TickTiming"), numbers: numbers(name, descriptors).map(Arc::new) }
+    }
 }
 
 /// A channel with tick timing.
@@ -66,14 +82,14 @@ impl ForeignChannel {
     pub(super) fn of(
         topic: &str,
         message_encoding: &str,
-        schema: Option<(&str, &[u8])>,
+        schema: Option<&ForeignSchema>,
         metadata: &BTreeMap<String, String>,
     ) -> Option<Self> {
-        let is_named = schema.is_some_and(|(name, _)| name.ends_with("TickTiming"));
+        let is_named = schema.is_some_and(|schema| schema.is_named);
         let name = topic.strip_prefix("/timing/").or(is_named.then(|| topic.trim_start_matches('/')))?;
         let encoding = match (message_encoding, schema) {
             ("json", _) => Encoding::Json,
-            ("protobuf", Some((message, descriptors))) => Encoding::Protobuf(numbers(message, descriptors)?),
+            ("protobuf", Some(schema)) => Encoding::Protobuf(schema.numbers.clone()?),
             _ => return None,
         };
         let rate_hz = metadata.get("rate_hz").and_then(|rate| rate.parse().ok()).filter(|rate| *rate > 0.0);
@@ -246,7 +262,8 @@ mod tests {
 
     fn channel(encoding: &str, schema: Option<(&str, &[u8])>, rate_hz: &str) -> Option<ForeignChannel> {
         let metadata = [("rate_hz".to_owned(), rate_hz.to_owned())].into();
-        let mut channel = ForeignChannel::of("/timing/servo", encoding, schema, &metadata)?;
+        let schema = schema.map(|(name, descriptors)| ForeignSchema::of(name, descriptors));
+        let mut channel = ForeignChannel::of("/timing/servo", encoding, schema.as_ref(), &metadata)?;
         channel.set_group(2);
         Some(channel)
     }

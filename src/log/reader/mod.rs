@@ -13,7 +13,7 @@ use std::path::Path;
 use mcap::records::{Record, op};
 
 pub use self::chunk::{ChunkHead, ChunkRecords};
-use self::foreign::ForeignChannel;
+use self::foreign::{ForeignChannel, ForeignSchema};
 pub use self::framing::{RecordStream, Section};
 pub use self::parsed::parse_record;
 use super::entry::LogEntry;
@@ -58,9 +58,10 @@ const READ_BUFFER_BYTES: usize = 1 << 18;
 pub struct LogReader<R> {
     records: RecordStream<R>,
     place: String,
-    schemas: HashMap<u16, (String, Vec<u8>)>,
+    schemas: HashMap<u16, Schema>,
     channels: HashMap<u16, Channel>,
-    topic: String,
+    /// That of the entry before.
+    channel: Option<u16>,
     messages: u64,
     /// What is left of the message just read.
     left: VecDeque<LogEntry>,
@@ -71,6 +72,19 @@ pub struct LogReader<R> {
     has_scene: bool,
     /// The damage was given as an error.
     is_told: bool,
+}
+
+/// What a schema says of the messages of its channels, of which there may be many.
+struct Schema {
+    /// `None` for messages that are not palpate's.
+    kind: Option<TopicKind>,
+    timing: ForeignSchema,
+}
+
+impl Schema {
+    fn of(name: String, descriptors: &[u8]) -> Self {
+        Self { kind: TopicKind::of_schema(&name, descriptors), timing: ForeignSchema::of(&name, descriptors) }
+    }
 }
 
 struct Channel {
@@ -105,7 +119,7 @@ impl<R: Read> LogReader<R> {
             place: place.to_owned(),
             schemas: HashMap::new(),
             channels: HashMap::new(),
-            topic: String::new(),
+            channel: None,
             messages: 0,
             left: VecDeque::new(),
             foreign: Some(foreign_environment()),
@@ -146,7 +160,7 @@ impl<R: Read> LogReader<R> {
 
     /// The topic of the entry before; empty for an environment or an attachment.
     pub fn topic(&self) -> &str {
-        &self.topic
+        self.channel.and_then(|id| self.channels.get(&id)).map_or("", |channel| &channel.topic)
     }
 
     /// The topics that the log has declared so far, with the number of messages read from each.
@@ -172,12 +186,12 @@ impl<R: Read> LogReader<R> {
         }
         match parse_record(opcode, body)? {
             Record::Schema { header, data } => {
-                self.schemas.insert(header.id, (header.name, data.into_owned()));
+                self.schemas.insert(header.id, Schema::of(header.name, &data));
             }
             // The index repeats every channel.
             Record::Channel(channel) if !self.channels.contains_key(&channel.id) => return Ok(self.declare(channel)),
             Record::Metadata(metadata) if metadata.name == "environment" => {
-                self.topic.clear();
+                self.channel = None;
                 self.foreign = None;
                 let version = metadata.metadata.get(SCHEMA_VERSION_KEY).and_then(|version| version.parse::<u32>().ok());
                 if let Some(version) = version.filter(|&version| version < OLDEST_SCHEMA) {
@@ -187,7 +201,7 @@ impl<R: Read> LogReader<R> {
                 return Ok(Some(LogEntry::Environment(Environment::from_map(&metadata.metadata))));
             }
             Record::Attachment { header, data, .. } => {
-                self.topic.clear();
+                self.channel = None;
                 return Ok(Some(LogEntry::Attachment { name: header.name, data: data.into_owned() }));
             }
             Record::Statistics(statistics) if statistics.message_count != self.messages => {
@@ -203,11 +217,12 @@ impl<R: Read> LogReader<R> {
 
     /// Takes in a channel; if it is one of another program's with tick timing, says which groups there are now.
     fn declare(&mut self, channel: mcap::records::Channel) -> Option<LogEntry> {
-        let schema = self.schemas.get(&channel.schema_id).map(|(name, data)| (name.as_str(), data.as_slice()));
-        let kind = schema.and_then(|(name, data)| TopicKind::of_schema(name, data));
+        let schema = self.schemas.get(&channel.schema_id);
+        let kind = schema.and_then(|schema| schema.kind);
         let mut foreign = None;
         let mut known = None;
         if let Some(environment) = self.foreign.as_mut() {
+            let schema = schema.map(|schema| &schema.timing);
             foreign = ForeignChannel::of(&channel.topic, &channel.message_encoding, schema, &channel.metadata);
             if let Some(foreign) = &mut foreign {
                 // A log that was merged or split may have several channels of one group.
@@ -239,7 +254,7 @@ impl<R: Read> LogReader<R> {
         };
         self.messages += 1;
         channel.messages += 1;
-        self.topic.clone_from(&channel.topic);
+        self.channel = Some(id);
         let kind = match (channel.kind, &mut channel.foreign) {
             // What palpate wrote says all of itself, whether or not the environment came through beside it.
             (Some(kind), _) => kind,
