@@ -11,10 +11,10 @@
 //! | `cause` | why: a number of [`SlipCause`], or its name |
 //!
 //! All times are integers in nanoseconds of one clock, from 0 to 2^63; in the report they count from the whole second in which
-//! the first release of the log was due. Messages are JSON (`message_encoding` `json`) or protobuf with their
-//! descriptors as the schema. A channel is read if its topic begins with `/timing/`, or if its schema's name ends in
-//! `TickTiming`; the rest of the topic names the group. Channel metadata `rate_hz` says the rate, which is otherwise
-//! taken from the first two releases.
+//! the first release of the log was due; releases before that are left out, which an event says. Messages are JSON
+//! (`message_encoding` `json`) or protobuf with their descriptors as the schema. A channel is read if its topic begins with
+//! `/timing/`, or if its schema's name ends in `TickTiming`; the rest of the topic names the group. Channel metadata `rate_hz`
+//! says the rate, which is otherwise taken from the first two releases.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -113,7 +113,8 @@ impl ForeignChannel {
     }
 
     /// Reads one message; `base` is the time that counts as the start of the run, found by the first message of a log.
-    pub(super) fn tick(&mut self, data: &[u8], base: &mut Option<u64>) -> Result<TickTiming, String> {
+    /// `None` for a release before that.
+    pub(super) fn tick(&mut self, data: &[u8], base: &mut Option<u64>) -> Result<Option<TickTiming>, String> {
         let values = match &self.encoding {
             Encoding::Json => of_json(data)?,
             Encoding::Protobuf(numbers) => of_protobuf(data, numbers)?,
@@ -125,11 +126,15 @@ impl ForeignChannel {
         let woke = values[WOKE].or(values[START]).ok_or("it has neither woke_ns nor start_ns")?;
         // Since 1970, since the machine's start or since the run's: the first second of the log is the first one here.
         let base = *base.get_or_insert(scheduled - scheduled % SECOND);
+        if scheduled < base {
+            return Ok(None);
+        }
         let since = |time: u64| Nanos(time.saturating_sub(base));
         let start = values[START].unwrap_or(woke);
         let end = values[END].unwrap_or(start);
         if let Some(last) = self.last {
-            let step = since(scheduled).saturating_sub(last.scheduled).0;
+            let periods = values[TICK].map_or(1, |tick| tick.saturating_sub(last.tick).max(1));
+            let step = since(scheduled).saturating_sub(last.scheduled).0 / periods;
             self.period = self.period.or((step > 0).then_some(step));
         }
         let tick = values[TICK].unwrap_or_else(|| self.number(since(scheduled)));
@@ -151,7 +156,7 @@ impl ForeignChannel {
             ..TickTiming::default()
         };
         self.last = Some(timing);
-        Ok(timing)
+        Ok(Some(timing))
     }
 
     /// The number of a release by its time: as many periods after the one before as it is later.
@@ -277,13 +282,39 @@ mod tests {
         let mut tick = |late: u64, due: u64| {
             let (scheduled, woke) = (start + due * 1_000_000, start + due * 1_000_000 + late);
             let text = format!("{{\"scheduled_ns\": {scheduled}, \"woke_ns\": {woke}, \"cause\": \"late_wake\"}}");
-            channel.tick(text.as_bytes(), &mut base).unwrap()
+            channel.tick(text.as_bytes(), &mut base).unwrap().unwrap()
         };
         let (first, second) = (tick(5, 0), tick(7, 4));
         assert_eq!((first.tick, first.scheduled, first.woke), (0, Nanos(500_000_000), Nanos(500_000_005)));
         assert_eq!((second.tick, second.slips, second.cause), (4, 3, SlipCause::LateWake));
         assert_eq!((second.start, second.end, second.deadline), (second.woke, second.woke, Nanos(505_000_000)));
         assert_eq!(second.group, 2);
+    }
+
+    #[test]
+    fn a_period_is_taken_from_the_numbers_of_the_releases() {
+        let mut channel = channel("json", None, "").unwrap();
+        let mut tick = |tick: u64, due_ms: u64| {
+            let due = due_ms * 1_000_000;
+            let text = format!("{{\"scheduled_ns\": {due}, \"woke_ns\": {due}, \"tick\": {tick}}}");
+            channel.tick(text.as_bytes(), &mut None).unwrap().unwrap()
+        };
+        tick(0, 10);
+        let second = tick(3, 40);
+        assert_eq!((second.slips, second.deadline), (2, Nanos(50_000_000)));
+    }
+
+    // Check that a release before time zero is not put there.
+    #[test]
+    fn a_release_before_the_first_second_of_the_log_is_left_out() {
+        let (mut channel, mut base) = (channel("json", None, "10").unwrap(), None);
+        let mut tick = |due: u64| {
+            let text = format!("{{\"scheduled_ns\": {due}, \"woke_ns\": {due}}}");
+            channel.tick(text.as_bytes(), &mut base).unwrap().map(|timing| (timing.tick, timing.scheduled))
+        };
+        assert_eq!(tick(5_000_000_000), Some((0, Nanos::ZERO)));
+        assert_eq!(tick(4_900_000_000), None);
+        assert_eq!(tick(5_100_000_000), Some((1, Nanos(100_000_000))));
     }
 
     // Check that palpate's own messages are read by their descriptors as by their types.
@@ -306,7 +337,7 @@ mod tests {
         };
         let mut message = Vec::new();
         timing.encode(&mut message);
-        assert_eq!(channel.tick(&message, &mut None), Ok(timing));
+        assert_eq!(channel.tick(&message, &mut None), Ok(Some(timing)));
         for cut in 1..message.len() {
             // Check that a cut message is an error or a message, never a panic
             let _ = of_protobuf(&message[..cut], &numbers(name, &descriptors).unwrap());

@@ -19,8 +19,11 @@ pub use self::parsed::parse_record;
 use super::entry::LogEntry;
 pub use super::messages::topic::{Topic, TopicKind};
 use super::messages::{self, LogMessage, foxglove};
-use super::records::{Environment, GroupInfo, LogRecord, LoggedExecution, MAX_DEVICES, MAX_GROUPS, SCHEMA_VERSION_KEY};
+use super::records::{
+    Environment, GroupInfo, Level, LogRecord, LoggedExecution, MAX_DEVICES, MAX_GROUPS, SCHEMA_VERSION_KEY, TextEvent,
+};
 use crate::error::{Error, ErrorKind};
+use crate::runtime::Nanos;
 
 /// Logs before it have other messages on `/tool` and `/log`.
 const OLDEST_SCHEMA: u32 = 2;
@@ -158,7 +161,7 @@ impl<R: Read> LogReader<R> {
         &self.place
     }
 
-    /// The topic of the entry before; empty for an environment or an attachment.
+    /// The topic of the entry before; empty for an environment, an attachment or what the reader itself says.
     pub fn topic(&self) -> &str {
         self.channel.and_then(|id| self.channels.get(&id)).map_or("", |channel| &channel.topic)
     }
@@ -261,6 +264,10 @@ impl<R: Read> LogReader<R> {
             (None, Some(foreign)) => {
                 let tick = foreign.tick(&data, &mut self.foreign_base);
                 let tick = tick.map_err(|e| format!("a message on {} is no tick timing: {e}", channel.topic))?;
+                let Some(tick) = tick else {
+                    self.channel = None;
+                    return Ok(Some(left_out(foreign.name())));
+                };
                 return Ok(Some(LogEntry::Record(LogRecord::Tick(tick))));
             }
             (None, None) => return Ok(None),
@@ -316,6 +323,12 @@ impl<R> std::fmt::Debug for LogReader<R> {
             .field("messages", &self.messages)
             .finish_non_exhaustive()
     }
+}
+
+/// Says that a release of `group` has no place in the time of the log.
+fn left_out(group: &str) -> LogEntry {
+    let message = format!("{group}: a release that was due before the first second of the log is left out");
+    LogEntry::Text(TextEvent { time: Nanos::ZERO, level: Level::Warning, message })
 }
 
 /// What is known of a run of another program.
