@@ -3,9 +3,10 @@
 //! The layout is that of `AbstractHistogram.outputPercentileDistribution` of HdrHistogram with five ticks per half
 //! distance. The values are exact: nearest rank over all samples, with no buckets in between.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Read, Write};
 
-use palpate::log::{Distribution, LogEntry, LogReader, LogRecord, TickGauge, Window};
+use palpate::log::{Distribution, Environment, LogEntry, LogReader, LogRecord, TickGauge, Window};
 use palpate::runtime::TickTiming;
 use palpate::{Error, printable};
 
@@ -82,22 +83,33 @@ pub fn export_percentiles<R: Read, W: Write>(
     window: &Window,
     out: &mut W,
 ) -> Result<(), Error> {
-    let topic = format!("/timing/{group}");
     let mut gauge = Gauge::new(figure);
     let mut values = Distribution::default();
+    let mut environment = Environment::default();
+    // By number, of groups that have releases.
+    let mut names = BTreeMap::new();
     while let Some(Ok(entry)) = reader.next() {
-        if reader.topic() == topic
-            && let LogEntry::Record(LogRecord::Tick(timing)) = &entry
-            && window.contains_entry(&entry)
-            && let Some(value) = gauge.measure(timing)
-        {
-            values.push(value);
+        match &entry {
+            LogEntry::Environment(told) => {
+                environment.clone_from(told);
+                names.clear();
+            }
+            LogEntry::Record(LogRecord::Tick(timing)) => {
+                let name = names.entry(timing.group).or_insert_with(|| environment.group_name(timing.group));
+                if name == group
+                    && window.contains_entry(&entry)
+                    && let Some(value) = gauge.measure(timing)
+                {
+                    values.push(value);
+                }
+            }
+            _ => {}
         }
     }
-    if reader.kind(&topic).or_else(|| lost_topic(reader, &topic)).is_none() {
-        let topics = reader.topics();
-        let groups: Vec<&str> = topics.keys().filter_map(|topic| topic.strip_prefix("/timing/")).collect();
-        return Err(unknown(reader, "rate group", group, &groups));
+    let named = environment.groups.iter().map(|info| &info.name);
+    let groups: BTreeSet<&str> = named.chain(names.values()).map(String::as_str).collect();
+    if !groups.contains(group) && lost_topic(reader, &format!("/timing/{group}")).is_none() {
+        return Err(unknown(reader, "rate group", group, &groups.into_iter().collect::<Vec<_>>()));
     }
     let group = printable(group);
     let title = format!("{} of rate group {group} in microseconds, exact percentiles (nearest rank)", figure.name());

@@ -1,6 +1,29 @@
-//! How options of `palpate export` that do not belong together are refused.
+//! What `palpate export` finds in a log, and how options that do not belong together are refused.
+
+use std::collections::BTreeMap;
 
 use crate::support::Folder;
+
+#[test]
+fn a_group_of_another_program_is_found_by_the_name_that_the_report_gives_it() {
+    let folder = Folder::new();
+    let mut bytes = Vec::new();
+    let mut writer = mcap::Writer::new(std::io::Cursor::new(&mut bytes)).unwrap();
+    let schema = writer.add_schema("loop.TickTiming", "jsonschema", b"{}").unwrap();
+    let channel_id = writer.add_channel(schema, "/servo", "json", &BTreeMap::new()).unwrap();
+    let header = mcap::records::MessageHeader { channel_id, sequence: 1, log_time: 0, publish_time: 0 };
+    writer.write_to_known_channel(&header, b"{\"scheduled_ns\": 0, \"woke_ns\": 7000}").unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    folder.write("other.mcap", bytes);
+    let export =
+        |group| folder.call(&["export", "other.mcap", "--format", "hgrm", "--figure", "lateness", "--group", group]);
+    assert!(folder.succeed(&["timing", "other.mcap"]).contains("servo"));
+    let called = export("servo");
+    assert!(called.code == Some(0) && called.out.contains("7.000"), "{called:?}");
+    let called = export("none");
+    assert!(called.code == Some(2) && called.err.contains("it has servo"), "{called:?}");
+}
 
 #[test]
 fn options_that_do_not_belong_together_are_refused_in_one_line() {
