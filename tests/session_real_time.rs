@@ -366,6 +366,8 @@ fn a_body_that_turns_nan_under_the_tool_ends_the_run_with_zero_force() {
     let (summary, written) = run_failing(false, LocalModelKind::Full, 5.0);
     assert!(written.lock().unwrap().iter().all(|force| force.iter().all(|c| c.is_finite())));
     assert_eq!(written.lock().unwrap().last(), Some(&Vec3::zeros()));
+    // The log has what was computed, not what was commanded in its place.
+    assert_eq!(summary.report.devices[0].force.not_finite, 1);
     let fault = summary.runtime.fault.as_ref().expect("a fault");
     assert_eq!((&*fault.group, &*fault.actor), ("local", "local"));
     assert!(events(&summary).contains("error: local: the local model's force is not finite"), "{}", events(&summary));

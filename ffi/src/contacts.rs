@@ -38,7 +38,11 @@ impl Contacts {
         // Of a tick come first the force, then the places, then the head.
         for record in records.newest() {
             match record {
-                LogRecord::Force(sample) => *slot(forces, sample.device) = sample.force_n,
+                LogRecord::Force(sample) => {
+                    // A model that has diverged is commanded as no force.
+                    let is_finite = sample.force_n.iter().all(|part| part.is_finite());
+                    *slot(forces, sample.device) = if is_finite { sample.force_n } else { [0.0; 3] };
+                }
                 LogRecord::ContactPoint(place) => places.push(place),
                 LogRecord::Contact(head) => {
                     let force_n = *slot(forces, head.device);

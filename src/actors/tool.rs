@@ -172,32 +172,29 @@ impl LocalTool {
             mode: serving.contact.mode,
         };
         self.ports.commands.publish(ctx);
-        self.record(Wrench { force, torque }, serving, probe);
+        self.record(computed, serving, probe);
         computed.is_finite()
     }
 
-    fn record(
-        &mut self,
-        Wrench { force, torque }: Wrench,
-        serving: &Serving<'_>,
-        probe: impl Fn(usize, u32) -> [Vec3; 2],
-    ) {
+    /// Records the force as it was `computed`, also if it was none; the contact is that of the force commanded.
+    fn record(&mut self, computed: Wrench, serving: &Serving<'_>, probe: impl Fn(usize, u32) -> [Vec3; 2]) {
         let &Serving { tick, kind, version, age_ticks, contact, points, area_m2 } = serving;
         let (time, device, energy_j) = (self.haptic.release(tick), self.number, self.energy);
         let recorder = &mut self.ports.recorder;
         let sample = ForceSample {
             time,
-            force_n: force.into(),
+            force_n: computed.force.into(),
             model_version: version,
             served_by: served_by(kind),
             model_age_s: self.haptic.release(age_ticks).as_secs_f64(),
             energy_j,
-            torque_n_m: torque.into(),
+            torque_n_m: computed.torque.into(),
             device,
         };
         LogRecord::Force(sample).push_to(recorder);
         touched::records(points, time, device, |point| recorder.push(point));
         let (count, area_m2) = (touched::count(points, &contact), area_m2 as f32);
+        let force = finite_or_none(computed).force;
         recorder.push(ContactSample { count, area_m2, device, ..contact_sample(time, &contact, force) });
         for (place, &node) in self.probes.iter().enumerate() {
             let [local_m, global_m] = probe(place, node).map(Into::into);

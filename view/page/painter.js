@@ -211,7 +211,8 @@ function paintTool(draw, tool, about) {
 
 function arrow(draw, from, force, width, tint) {
   const length = norm(force) * perNewton();
-  if (length < 2 * width) return;
+  // Also of no number.
+  if (!(length >= 2 * width)) return;
   const head = Math.min(0.5 * length, 5 * width);
   const way = unit(force);
   const neck = plus(from, way, length - head);
