@@ -5,7 +5,7 @@ mod session_support;
 
 use palpate::log::GlobalTick;
 use palpate::model::local::Kind as LocalModelKind;
-use palpate::runtime::{Disturbance, Nanos};
+use palpate::runtime::{Disturbance, Nanos, RateGroup};
 use palpate::scene::SafetyStage;
 use palpate::session::{Session, Summary};
 use session_support::*;
@@ -82,4 +82,14 @@ fn a_load_that_lasts_leaves_no_growing_backlog_and_the_force_is_back_after_it() 
     }
     let commanded = commands(&loaded);
     assert!(commanded.last().is_some_and(|command| norm(command.force_n) > 0.1), "{:?}", commanded.last());
+}
+
+#[test]
+fn a_stall_in_the_first_ticks_of_a_slow_haptic_loop_is_no_fault() {
+    let stall =
+        |release| Disturbance { late_wake: Nanos(if release == 1 { 110 * MS } else { 0 }), ..Disturbance::default() };
+    let session = Session::builder(block()).path(pressing()).model(LocalModelKind::Patch).virtual_time().keep_records();
+    let session = session.local(RateGroup::hz(50)).disturb("global", stall).duration_s(1.0);
+    let summary = session.build().unwrap().run().unwrap();
+    assert_eq!((summary.runtime.fault, summary.runtime.restarts), (None, vec![]));
 }

@@ -130,7 +130,9 @@ impl GlobalActor {
         let mut cause = None;
         if newest.saturating_sub(self.now()) > self.plan.most_ticks() {
             let before = self.begin_way();
-            let taken = (0..).take_while(|_| self.take_samples(newest - self.plan.way_ticks())).count();
+            // A slow haptic loop may have had fewer ticks than the way has.
+            let end = newest.saturating_sub(self.plan.way_ticks());
+            let taken = (0..).take_while(|_| self.take_samples(end)).count();
             cause = self.go(before, taken);
         }
         loop {
