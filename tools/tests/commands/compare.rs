@@ -70,6 +70,18 @@ fn errors_are_the_same_every_time_and_the_scenes_own_model_and_latency_do_not_ma
     assert_eq!(errors(&folder), first);
 }
 
+// Check one step a tick of a quarter of a millisecond: twice the steps are two.
+#[test]
+fn the_reference_differs_from_one_in_twice_its_steps_at_any_haptic_rate() {
+    let folder = Folder::new();
+    folder.spoil("rate_hz = 1000\n", "rate_hz = 4000\n");
+    let scene = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
+    folder.write("scene.toml", scene.replace("[global]\n", "[global]\nsubsteps_per_ms = 2\n"));
+    let document = compared(&folder, &["--models", "hold", "--duration", "0.1"]);
+    let finer = &document["finer"][0];
+    assert!(finer["error_percent"]["rms"].as_f64().is_some_and(|rms| rms > 0.0), "{finer}");
+}
+
 #[test]
 fn the_table_has_the_rows_and_says_what_they_come_to() {
     let folder = Folder::new();
