@@ -89,13 +89,15 @@ pub struct ModelResponse {
     pub order: usize,
     /// `[re, im]` for each channel and frequency.
     pub gains: Vec<Vec<[f64; 2]>>,
-    /// Error at rest over all channels: norm of the difference over the norm of the reference, %.
+    /// Error at rest over all channels: norm of the difference over the norm of the reference, %; not a number if rest is not among the
+    /// frequencies.
     #[serde(rename = "at_rest_error_percent")]
     pub at_rest_pct: f64,
-    /// Error over all channels at the worst frequency above rest: norm of the difference over the norm of the reference, %.
+    /// Error over all channels at the worst frequency above rest: norm of the difference over the norm of the reference, %; not a number if
+    /// there is none.
     #[serde(rename = "worst_error_percent")]
     pub worst_pct: f64,
-    /// Frequency of the worst error (Hz).
+    /// Frequency of the worst error (Hz); not a number if there is none.
     pub worst_hz: f64,
     /// The error that the model itself estimates for its worst frequency, without the reference, in the same measure, %; `None` for
     /// the reference.

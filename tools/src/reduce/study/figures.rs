@@ -72,7 +72,8 @@ impl Studied {
     }
 }
 
-/// How the Hankel singular values of `balanced` fall, of `order` states in all; `hinf_pct` says how far a truncation is from the whole.
+/// How the Hankel singular values of `balanced` fall, of `order` states in all; `hinf_pct` says how far a truncation is from the whole. Of
+/// `orders`, those above the numerical rank are one, the rank.
 pub(super) fn hankel_decay(
     title: String,
     order: usize,
@@ -80,7 +81,10 @@ pub(super) fn hankel_decay(
     orders: &[usize],
     hinf_pct: &dyn Fn(&StateSpace) -> f64,
 ) -> HankelDecay {
-    let truncation = |&order: &usize| Truncation {
+    let mut kept: Vec<usize> = orders.iter().map(|&order| order.min(balanced.rank())).collect();
+    kept.sort_unstable();
+    kept.dedup();
+    let truncation = |order: usize| Truncation {
         order,
         error_pct: balanced.tail_pct(order),
         hinf_pct: hinf_pct(&balanced.truncated(order)),
@@ -90,7 +94,7 @@ pub(super) fn hankel_decay(
         order,
         values: balanced.hankel[..balanced.rank()].to_vec(),
         unit: "N/m".to_owned(),
-        truncations: orders.iter().map(truncation).collect(),
+        truncations: kept.into_iter().map(truncation).collect(),
     }
 }
 
@@ -119,6 +123,7 @@ impl<'a> FigureOf<'a> {
     ) {
         let channels = self.figure.channels.len();
         let mut out = ModelResponse { name: name.to_owned(), order, seconds, ..ModelResponse::default() };
+        (out.at_rest_pct, out.worst_pct, out.worst_hz) = (f64::NAN, f64::NAN, f64::NAN);
         out.gains = vec![Vec::new(); channels];
         let mut estimates = Vec::new();
         for &hz in &self.figure.hz {
@@ -132,7 +137,7 @@ impl<'a> FigureOf<'a> {
             let error_pct = 100.0 * (&gain - &reference).norm() / reference.norm();
             if hz == 0.0 {
                 out.at_rest_pct = error_pct;
-            } else if error_pct.is_nan() || error_pct > out.worst_pct {
+            } else if out.worst_hz.is_nan() || error_pct.is_nan() || error_pct > out.worst_pct {
                 (out.worst_pct, out.worst_hz) = (error_pct, hz);
             }
             if let Some(bound) = bound {
@@ -197,7 +202,8 @@ pub(super) fn all_models(studied: &Studied, title: String, order: usize, hz: &[f
     let mut figure = studied.figure(title, hz);
     figure.add_balanced(*seconds, balanced, order);
     let kept = local_coordinates(mesh);
-    let moments = (order / 2).div_ceil(system.ports.inputs()).max(1);
+    // A space of more states than there are would be looked for without end.
+    let moments = (order.min(system.order()) / 2).div_ceil(system.ports.inputs()).max(1);
     let shift = SHIFT * system.typical_frequency();
     let mut add = |name: &str, make: &dyn Fn() -> Result<Projection, Error>| {
         let started = Instant::now();

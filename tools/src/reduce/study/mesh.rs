@@ -37,15 +37,45 @@ pub fn reduce_mesh(study: &MeshStudy, mut progress: impl FnMut(&ReduceProgress))
     let studied = Studied::new(&mesh)?;
     steps.begin("frequency responses");
     let title = format!("models of {} cells, zeta {}", in_words(&mesh), mesh.damping_ratio);
-    let mut orders: Vec<usize> = [2, 4, 6, 8, 10, 15, 20, 30, 50, study.order].to_vec();
-    orders.retain(|&order| order <= studied.balanced.rank().max(study.order));
-    orders.sort_unstable();
-    orders.dedup();
     Ok(ReductionStudy {
         subject: format!("{} cells", in_words(&mesh)),
         responses: vec![all_models(&studied, title, study.order, &study.hz)?],
-        hankel: vec![studied.decay(&orders)],
+        hankel: vec![studied.decay(&[2, 4, 6, 8, 10, 15, 20, 30, 50, study.order])],
         seconds: started.elapsed().as_secs_f64(),
         ..ReductionStudy::default()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reduced(order: usize, hz: &[f64]) -> ReductionStudy {
+        let study = MeshStudy { cells: vec![5, 5], order, hz: hz.to_vec(), ..MeshStudy::default() };
+        reduce_mesh(&study, |_| {}).unwrap()
+    }
+
+    #[test]
+    fn errors_at_frequencies_that_were_not_asked_for_are_not_there() {
+        for (hz, at_rest, above) in
+            [(&[10.0, 100.0][..], false, true), (&[0.0], true, false), (&[0.0, 10.0], true, true)]
+        {
+            for model in &reduced(4, hz).responses[0].models {
+                let found = [model.at_rest_pct, model.worst_pct, model.worst_hz].map(f64::is_finite);
+                assert_eq!(found, [at_rest, above, above], "{hz:?}: {}", model.name);
+            }
+        }
+    }
+
+    // Check an order above the states of the whole, and one that no loop reaches the end of.
+    #[test]
+    fn no_truncation_keeps_more_states_than_there_are() {
+        for order in [200, usize::MAX] {
+            let study = reduced(order, &[10.0]);
+            let decay = &study.hankel[0];
+            let kept: Vec<usize> = decay.truncations.iter().map(|cut| cut.order).collect();
+            assert!(kept.is_sorted_by(|a, b| a < b) && kept.last() == Some(&decay.values.len()), "{order}: {kept:?}");
+            assert!(study.responses[0].models.iter().all(|model| model.order <= decay.order), "{order}");
+        }
+    }
 }

@@ -253,8 +253,6 @@ impl Study<'_> {
         let reduced = low_rank(&system, SHIFTS)?;
         let mut orders = vec![2, 4, 6, 10, 15, 20, 30, 50];
         orders.extend(order);
-        orders.sort_unstable();
-        orders.dedup();
         let (model, modal) = (&reduced.projection.model, Modal::of(&reduced.projection.model));
         let hinf_pct = |truncated: &StateSpace| match &modal {
             Some(modal) => gain_error(modal, truncated),
