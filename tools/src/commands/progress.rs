@@ -23,12 +23,15 @@ const STEP: Duration = Duration::from_millis(50);
 /// Those of [`Scene::load`].
 pub fn load(path: &Path) -> Result<Scene, Error> {
     const ALL: f64 = 1000.0;
-    // A file comes first: whoever has one of that name means it.
-    if !path.exists() && path.extension().is_none() && path.components().count() == 1 {
-        let built_in = path.to_str().and_then(BuiltIn::named);
-        let missing =
-            || Error::new(ErrorKind::Usage, "no such file, and no scene is built in by that name: see `palpate list`");
-        return built_in.map(BuiltIn::load).ok_or_else(|| missing().at(name_of(path)));
+    // A file comes first: whoever has one of that name means it. A folder is no scene.
+    if !path.is_file() && path.extension().is_none() && path.components().count() == 1 {
+        if let Some(built_in) = path.to_str().and_then(BuiltIn::named) {
+            return Ok(built_in.load());
+        }
+        if !path.exists() {
+            let message = "no such file, and no scene is built in by that name: see `palpate list`";
+            return Err(Error::new(ErrorKind::Usage, message).at(name_of(path)));
+        }
     }
     let mut filling = None;
     let scene = Scene::load_with(path, &mut |done| {

@@ -161,6 +161,10 @@ fn a_doctor_and_completions_are_at_hand() {
     for shell in ["bash", "zsh", "fish"] {
         assert!(folder.succeed(&["completions", shell]).contains("replay"), "{shell}");
     }
+    // A folder of that name is not.
+    std::fs::create_dir(folder.path("cantilever")).unwrap();
+    let run = ["run", "cantilever", "--virtual", "--duration", "0.1"];
+    assert!(folder.succeed(&run).contains("0.100 s of virtual time"));
 }
 
 #[test]
