@@ -36,7 +36,7 @@ struct HaplyArgs {
     #[arg(long, value_name = "NAME")]
     fault: Option<String>,
     /// The fault begins after so many commands
-    #[arg(long, value_name = "COMMANDS", default_value_t = 3000)]
+    #[arg(long, value_name = "COMMANDS", default_value_t = 3000, requires = "fault")]
     after: u64,
     /// End after this many seconds; without, Ctrl-C ends it
     #[arg(long, value_name = "S")]

@@ -58,6 +58,7 @@ pub fn demo() -> Result<(), Error> {
 /// # Errors
 /// Input errors of the scene, or a failed run.
 pub fn run(args: &RunArgs) -> Result<(), Error> {
+    args.global.check()?;
     let mut scene = progress::load(&args.scene)?;
     let out = args.out.as_deref().unwrap_or(Path::new(if args.virtual_time { VIRTUAL_LOG } else { DEFAULT_LOG }));
     files::keep_inputs(&files::inputs_of(&args.scene, &scene), out)?;

@@ -53,6 +53,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Error> {
     if let Some(log) = args.scene.as_deref().filter(|path| is_log(path)) {
         return show_log(log, args);
     }
+    args.global.check()?;
     let (mut scene, name) = match &args.scene {
         Some(path) => (progress::load(path)?, shared::name_of(path)),
         None => (Scene::demo(), "demo scene".to_owned()),

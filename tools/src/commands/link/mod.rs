@@ -4,9 +4,9 @@
 
 use std::path::PathBuf;
 
-use palpate::Error;
 use palpate::scene::ModelChoice;
 use palpate::session::SessionBuilder;
+use palpate::{Error, ErrorKind};
 
 use super::shared;
 
@@ -41,6 +41,22 @@ pub struct GlobalArgs {
 }
 
 impl GlobalArgs {
+    /// Refuses what says how to reach a global model elsewhere where none is asked for.
+    ///
+    /// # Errors
+    /// [`ErrorKind::Usage`] if there is something of that kind.
+    pub fn check(&self) -> Result<(), Error> {
+        let given = [("--config", self.access.config.is_some()), ("--insecure", self.access.insecure)];
+        match given.into_iter().find(|(_, is_given)| *is_given && self.address.is_none()) {
+            Some((option, _)) => {
+                let message =
+                    format!("{option} is for a global model elsewhere: add --global ADDRESS, or leave it out");
+                Err(Error::new(ErrorKind::Usage, message))
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Lets a session take its global models from there, if they are not made here.
     ///
     /// # Errors
