@@ -6,6 +6,7 @@ use palpate::scene::Scene;
 use palpate::{Error, Session};
 
 use super::shared;
+use crate::units::plural;
 
 /// Prints what real time needs of a machine, and how it stands there.
 ///
@@ -19,11 +20,16 @@ pub fn run() -> Result<(), Error> {
 
 fn diagnosis(plan: &Plan) -> String {
     let mut page = Page::default();
-    let lacks = plan.machine.iter().filter(|finding| finding.state == Readiness::Missing).count();
+    let count = |state| plan.machine.iter().filter(|finding| finding.state == state).count();
+    let (lacks, unknown) = (count(Readiness::Missing), count(Readiness::Unknown));
     let refused = plan.missing.len();
-    page.paragraph(&match (refused, lacks) {
-        (0, 0) => "READY: everything that real time needs is there".to_owned(),
-        (0, _) => "USABLE: every privilege is granted; on a machine that does other work too, the tail of the lateness is longer than it need be".to_owned(),
+    page.paragraph(&match (refused, lacks, unknown) {
+        (0, 0, 0) => "READY: everything that real time needs is there".to_owned(),
+        (0, 0, _) => {
+            let points = plural(unknown as u64, "point is", "points are");
+            format!("READY: as far as the system says, {points} unknown")
+        }
+        (0, _, _) => "USABLE: every privilege is granted; on a machine that does other work too, the tail of the lateness is longer than it need be".to_owned(),
         _ => "LIMITED: the system refuses privileges; runs go on without, with more lateness, and their reports say so".to_owned(),
     });
     page.line(String::new());
@@ -67,6 +73,8 @@ mod tests {
         }
         plan.missing.clear();
         plan.machine.iter_mut().for_each(|finding| finding.state = Readiness::Ready);
-        assert!(diagnosis(&plan).starts_with("READY: "));
+        assert!(diagnosis(&plan).starts_with("READY: everything"));
+        plan.machine[1].state = Readiness::Unknown;
+        assert!(diagnosis(&plan).starts_with("READY: as far as the system says, 1 point is unknown\n"));
     }
 }
