@@ -3,6 +3,7 @@
 
 mod support;
 
+use std::io::Write;
 use std::process::{Child, Command, Output, Stdio};
 
 use support::{Called, Folder, SCENE, rewrite_log};
@@ -202,6 +203,44 @@ fn an_interrupted_command_leaves_no_part_of_its_output() {
     let called = ended(child.wait_with_output().unwrap());
     assert_eq!((called.code, &*called.out), (Some(130), ""), "{called:?}");
     assert_eq!(folder.files(), files);
+}
+
+/// True if a process handles SIGINT.
+fn handles_interrupts(child: &Child) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    caught.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).unwrap() & 1 << 1 != 0)
+}
+
+// Check a log that never ends, through a pipe, and one with a hole that takes long to look through.
+#[test]
+fn an_interrupted_copy_of_a_log_leaves_no_part_of_it() {
+    let folder = Folder::new();
+    folder.succeed(&["run", "scene.toml", "--virtual", "--out", "run.mcap"]);
+    let begin = &std::fs::read(folder.path("run.mcap")).unwrap()[..4096];
+    folder.write("hole.mcap", begin);
+    let hole = std::fs::OpenOptions::new().write(true).open(folder.path("hole.mcap")).unwrap();
+    hole.set_len(1 << 34).unwrap();
+    Command::new("mkfifo").arg(folder.path("pipe")).status().unwrap();
+    let files = folder.files();
+    let interrupt = |mut child: Child| {
+        for _ in 0..1000 {
+            if folder.files() != files && handles_interrupts(&child) {
+                break;
+            }
+            assert_eq!(child.try_wait().unwrap(), None, "it ended by itself");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let called = ended(child.wait_with_output().unwrap());
+        assert_eq!((called.code, &*called.out), (Some(130), ""), "{called:?}");
+        assert_eq!(folder.files(), files);
+    };
+    let export = spawn(&folder, &["export", "pipe", "--format", "chrome-trace", "--out", "new"]);
+    let mut pipe = std::fs::OpenOptions::new().write(true).open(folder.path("pipe")).unwrap();
+    pipe.write_all(begin).unwrap();
+    interrupt(export);
+    interrupt(spawn(&folder, &["log", "recover", "hole.mcap", "--out", "new"]));
 }
 
 // A name space of users, in which nobody may do what permissions deny.

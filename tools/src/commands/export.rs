@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use palpate::log::{LogReader, Window};
 use palpate::{Error, ErrorKind};
 
-use super::files::OutputFile;
+use super::files::begin_file;
 use super::progress::ReadBar;
 use super::shared::{WindowArgs, forgive_closed_pipe, warn_of_damage};
 use crate::export::{TickDuration, export_percentiles, export_table, export_trace, is_turned};
@@ -82,7 +82,7 @@ fn write_file<R: Read>(
     log: &Path,
     path: &Path,
 ) -> Result<(), Error> {
-    let output = OutputFile::create(path, &[log])?;
+    let output = begin_file(path, &[log])?;
     write(what, reader, window, &mut BufWriter::new(&output)).map_err(|e| match e.kind() {
         ErrorKind::Io => e.at(path.display().to_string()),
         _ => e,

@@ -181,14 +181,23 @@ impl Write for &OutputFile {
     }
 }
 
-/// Begins what a command writes after its work, if it is asked for: before the work, which would be lost if it could not be written. A
-/// command that is interrupted meanwhile leaves nothing behind. For commands that handle interrupts in no other way.
+/// Begins what a command writes after its work, if it is asked for: before the work, which would be lost if it could not be written. For
+/// commands that handle interrupts in no other way.
+///
+/// # Errors
+/// Those of [`begin_file`].
+pub fn begin(path: Option<&Path>, inputs: &[impl AsRef<Path>]) -> Result<Option<OutputFile>, Error> {
+    path.map(|path| begin_file(path, inputs)).transpose()
+}
+
+/// Begins the file `path`, which is none of `inputs`: a command that is interrupted meanwhile leaves nothing behind. For commands that
+/// handle interrupts in no other way.
 ///
 /// # Errors
 /// Those of [`OutputFile::create`], and those of [`on_interrupt`].
-pub fn begin(path: Option<&Path>, inputs: &[impl AsRef<Path>]) -> Result<Option<OutputFile>, Error> {
-    let output = path.map(|path| OutputFile::create(path, inputs)).transpose()?;
-    if let Some([part, _]) = output.as_ref().and_then(|output| output.part.clone()) {
+pub fn begin_file(path: &Path, inputs: &[impl AsRef<Path>]) -> Result<OutputFile, Error> {
+    let output = OutputFile::create(path, inputs)?;
+    if let Some([part, _]) = output.part.clone() {
         on_interrupt(move || {
             let _ = fs::remove_file(&part);
             std::process::exit(EXIT_CODE.into());

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use palpate::{Error, ErrorKind};
 
-use super::files::{OutputFile, keep_inputs};
+use super::files::{begin_file, keep_inputs};
 use super::log_info::{bytes, count, seconds, span, to_json, to_text};
 use super::progress::ReadBar;
 use super::shared::{name_of, print, print_report, warn_of_damage};
@@ -128,7 +128,7 @@ fn run_recover(args: &RecoverArgs) -> Result<(), Error> {
     keep_inputs(&[&args.log], &args.out)?;
     // Before a pipe is opened.
     palpate::log::LogReader::open(&args.log)?;
-    let output = OutputFile::create(&args.out, &[&args.log])?;
+    let output = begin_file(&args.out, &[&args.log])?;
     let bar = ReadBar::new(&place);
     let (source, written) = (BufReader::with_capacity(1 << 18, source), BufWriter::with_capacity(1 << 18, &output));
     let recovered = recover(source, &place, written, &new_place, |read, length| bar.show(read, length));

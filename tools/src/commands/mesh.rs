@@ -7,7 +7,7 @@ use palpate::model::mesh::TetrahedralMesh;
 use palpate::{Error, ErrorKind};
 use palpate_mesh::{MeshError, Sizes, fill, read_surface_file, read_volume_file, write_msh};
 
-use super::files::{OutputFile, begin};
+use super::files::{OutputFile, begin_file};
 use super::progress::{StepBar, preparing};
 use super::shared;
 use crate::mesh::{MeshReport, SurfaceReport};
@@ -62,7 +62,7 @@ fn checked(args: &MeshArgs) -> Result<MeshReport, Error> {
 }
 
 fn filled(args: &MeshArgs, size_mm: f64, out: &Path) -> Result<MeshReport, Error> {
-    let output = begin(Some(out), &[&args.file])?;
+    let output = begin_file(out, &[&args.file])?;
     let surface = read_surface_file(&args.file).map_err(refusal)?.scaled(args.unit_m);
     let (surface, findings) = surface.cleaned().map_err(|error| at(&args.file, error))?;
     let sizes = Sizes { element_m: size_mm * 1e-3, surface_m: args.surface_size_mm.map(|size| size * 1e-3) };
@@ -71,7 +71,7 @@ fn filled(args: &MeshArgs, size_mm: f64, out: &Path) -> Result<MeshReport, Error
     shown.clear();
     let mesh = made.map_err(|error| at(&args.file, error))?;
     let (mesh, left_out) = mesh.cleaned().map_err(|error| at(&args.file, error.into()))?;
-    output.map_or(Ok(()), |output| write(&mesh, output, out))?;
+    write(&mesh, output, out)?;
     let mut report = report(&args.file, mesh);
     report.left_out_nodes = left_out.nodes;
     report.out = Some(shared::name_of(out));
