@@ -168,7 +168,8 @@ fn usage_error(error: &clap::Error) -> Error {
     let complaint = complaint.split("\n\nFor more information").next().unwrap_or(complaint);
     let complaint = complaint.trim_start_matches("error: ");
     let subcommands: Vec<String> = Cli::command().get_subcommands().map(|c| c.get_name().to_owned()).collect();
-    let asked = std::env::args().nth(1).filter(|word| subcommands.contains(word));
+    let first = std::env::args_os().nth(1).and_then(|word| word.into_string().ok());
+    let asked = first.filter(|word| subcommands.contains(word));
     let help = asked.map_or("palpate --help".to_owned(), |word| format!("palpate {word} --help"));
     Error::new(ErrorKind::Usage, format!("{complaint}; see `{help}`"))
 }

@@ -131,6 +131,15 @@ fn a_bad_command_line_is_refused_in_one_line() {
     assert_eq!(std::fs::read_to_string(folder.path("path.csv")).unwrap(), PATH);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_command_that_is_no_text_is_refused_in_one_line() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = Folder::new();
+    let called = folder.call_with(&[std::ffi::OsStr::from_bytes(b"r\xffn")]);
+    assert_refused(&called, &["unrecognized subcommand", "palpate --help"]);
+}
+
 #[test]
 fn help_and_version_are_answers_not_errors() {
     let folder = Folder::new();
@@ -152,6 +161,10 @@ fn built_in_scenes_are_listed_and_run_by_their_names() {
     // A file of that name is what is meant.
     folder.write("drag_friction", "no scene");
     assert_refused(&folder.call(&run), &["drag_friction:1"]);
+    // A folder of that name is not.
+    std::fs::create_dir(folder.path("cantilever")).unwrap();
+    let run = ["run", "cantilever", "--virtual", "--duration", "0.1"];
+    assert!(folder.succeed(&run).contains("0.100 s of virtual time"));
     assert_refused(
         &folder.call(&["run", "drag_frictoin", "--virtual"]),
         &["drag_frictoin: no such file", "palpate list"],
@@ -166,10 +179,6 @@ fn a_doctor_and_completions_are_at_hand() {
     for shell in ["bash", "zsh", "fish"] {
         assert!(folder.succeed(&["completions", shell]).contains("replay"), "{shell}");
     }
-    // A folder of that name is not.
-    std::fs::create_dir(folder.path("cantilever")).unwrap();
-    let run = ["run", "cantilever", "--virtual", "--duration", "0.1"];
-    assert!(folder.succeed(&run).contains("0.100 s of virtual time"));
 }
 
 #[test]

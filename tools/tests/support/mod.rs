@@ -4,6 +4,7 @@
 mod rewritten;
 mod scene;
 
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -56,6 +57,11 @@ impl Folder {
 
     /// Runs `palpate` with `args` in this folder.
     pub fn call(&self, args: &[&str]) -> Called {
+        self.call_with(args)
+    }
+
+    /// The same with arguments that need not be text.
+    pub fn call_with(&self, args: &[impl AsRef<OsStr>]) -> Called {
         palpate(self.0.path(), args)
     }
 
@@ -67,7 +73,7 @@ impl Folder {
     }
 }
 
-fn palpate(folder: &Path, args: &[&str]) -> Called {
+fn palpate(folder: &Path, args: &[impl AsRef<OsStr>]) -> Called {
     let output = Command::new(env!("CARGO_BIN_EXE_palpate"))
         .args(args)
         .current_dir(folder)
