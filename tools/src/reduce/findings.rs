@@ -209,10 +209,12 @@ pub struct FaceMap {
     pub face: String,
     /// Names of the two axes along it, such as `x` and `y`.
     pub axes: [String; 2],
-    /// Places along the first axis (m).
+    /// Places along the first axis (m): of the nodes of a block, of the middles of a grid's cells over another body.
     pub first_m: Vec<f64>,
     /// Places along the second axis (m).
     pub second_m: Vec<f64>,
+    /// Where the body ends along the two axes, from and to (m).
+    pub ends_m: [[f64; 2]; 2],
     /// One entry for each pair, the first axis fastest; `None` where the node is held or there is none.
     pub contacts: Vec<Option<ContactLocality>>,
 }

@@ -16,7 +16,7 @@
 //! | `shapes[]` | `title`, `nodes_m`, `input_m`, `in_local`, `states[]` with `hankel` (over the largest), `amplitude` (over the node that moves most), `local_share` (0 to 1) |
 //! | `locality` | `local`, `verdict` (a sentence, not for programs), `warnings`, `patch`, `patch_bounds_m`, `spacing_m`, `band_hz`, `band_limit_percent`, `at_rest_limit_percent`, `reference_percent`, `contact`, `faces[]`, `sizes[]`, `bases[]`, `budget`, `measured` |
 //! | a contact | `node`, `position_m`, `stiffness_n_per_m`, `at_rest_error_percent`, `band_error_percent`, `worst_error_percent` |
-//! | `locality.faces[]` | `face`, `axes`, `first_m`, `second_m`, `contacts`: the first axis fastest, `null` where the node is held |
+//! | `locality.faces[]` | `face`, `axes`, `first_m`, `second_m`, `ends_m` (of the body along both), `contacts`: the first axis fastest, `null` where the node is held |
 //! | `locality.sizes[]` | `patch`, `nodes`, `contact` and `worst_contact` with this patch |
 //! | `locality.bases[]` | `states`, `error_percent` |
 //! | `locality.budget` | `error_percent`, `patch` and `states` that meet it (`null`: none does); `null` if no budget was given |

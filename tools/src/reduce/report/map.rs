@@ -26,17 +26,14 @@ pub(super) fn faces(locality: &Locality) -> Vec<&FaceMap> {
 pub(super) fn map(face: &FaceMap, contact: u32) -> String {
     let (wide, high) = (face.first_m.len(), face.second_m.len());
     let every = wide.max(high).div_ceil(MOST).max(1);
-    let ends = |places: &[f64]| {
-        let end = |at: Option<&f64>| at.map_or("-".to_owned(), |m| figure(1e3 * m));
-        format!("{} to {} mm", end(places.first()), end(places.last()))
-    };
+    let ends = |[from, to]: [f64; 2]| format!("{} to {} mm", figure(1e3 * from), figure(1e3 * to));
     let mut text = format!(
         "Error between resyncs on {}, {} to the right ({}), {} upwards ({})",
         face.face,
         face.axes[0],
-        ends(&face.first_m),
+        ends(face.ends_m[0]),
         face.axes[1],
-        ends(&face.second_m)
+        ends(face.ends_m[1])
     );
     if every > 1 {
         text.push_str(&format!(", each digit the worst of {every} x {every}"));
@@ -115,6 +112,7 @@ mod tests {
     fn held_nodes_are_dots_and_large_maps_show_the_worst() {
         let mut face = sample().locality.unwrap().faces.remove(1);
         assert_eq!(map(&face, u32::MAX).lines().last().unwrap(), format!("   {}", " .".repeat(12)));
+        face.ends_m = [[-0.5e-3, 89.5e-3], [0.0, 1e-3]];
         face.first_m = (0..90).map(|at| f64::from(at) * 1e-3).collect();
         face.second_m = vec![0.0, 1e-3];
         face.contacts = vec![face.contacts[20]; 180];
@@ -122,6 +120,7 @@ mod tests {
         last.band_pct = 99.0;
         let text = map(&face, u32::MAX);
         assert!(text.contains("worst of 2 x 2") && text.ends_with(" 9\n"), "{text}");
+        assert!(text.contains("(-0.500 to 89.5 mm)"), "the ends of the body: {text}");
         assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
     }
 

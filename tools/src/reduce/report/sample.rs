@@ -168,7 +168,8 @@ fn face(name: &str, axes: [&str; 2], nodes: [usize; 2], place: impl Fn(f64, f64)
             contacts.push((!is_held).then(|| contact(node, place(first, second), error)));
         }
     }
-    FaceMap { face: name.into(), axes: axes.map(str::to_owned), first_m, second_m, contacts }
+    let ends_m = nodes.map(|count| [0.0, (count - 1) as f64 * 0.01]);
+    FaceMap { face: name.into(), axes: axes.map(str::to_owned), first_m, second_m, ends_m, contacts }
 }
 
 fn locality() -> Locality {

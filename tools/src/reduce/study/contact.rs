@@ -96,6 +96,7 @@ pub(super) struct ContactGrid {
     pub(super) face: Face,
     axes: [usize; 2],
     places_m: [Vec<f64>; 2],
+    ends_m: [[f64; 2]; 2],
     /// The node at each pair of places, the first axis fastest.
     pub(super) nodes: Vec<Option<u32>>,
 }
@@ -153,8 +154,10 @@ impl ContactGrid {
             places[0].iter().map(|&a| at(axes[0], id(a, 0))).collect(),
             places[1].iter().map(|&b| at(axes[1], id(0, b))).collect(),
         ];
+        // The outer nodes are the body's edges.
+        let ends_m = places_m.each_ref().map(|places: &Vec<f64>| [places[0], places[places.len() - 1]]);
         let nodes = places[1].iter().flat_map(|&b| places[0].iter().map(move |&a| Some(id(a, b))));
-        Self { face, axes, places_m, nodes: nodes.collect() }
+        Self { face, axes, places_m, ends_m, nodes: nodes.collect() }
     }
 
     /// What is seen of any body from a side through a grid of `width` (m): in each cell the outermost node that faces it.
@@ -181,7 +184,8 @@ impl ContactGrid {
         let middle = |n: usize| (0..cells[n]).map(|at| low[n] + (at as f64 + 0.5) * width).collect();
         let nodes = (0..cells[1]).flat_map(|b| (0..cells[0]).map(move |a| [a, b]));
         let nodes = nodes.map(|at| outermost.get(&at).copied()).collect();
-        Self { face, axes, places_m: [middle(0), middle(1)], nodes }
+        let ends_m = [0, 1].map(|n| [low[n], high[n]]);
+        Self { face, axes, places_m: [middle(0), middle(1)], ends_m, nodes }
     }
 
     /// An empty map of these contacts.
@@ -192,6 +196,7 @@ impl ContactGrid {
             axes: self.axes.map(|axis| ["x", "y", "z"][axis].to_owned()),
             first_m,
             second_m,
+            ends_m: self.ends_m,
             contacts: Vec::new(),
         }
     }
@@ -201,4 +206,29 @@ impl ContactGrid {
 fn side_of(body: &dyn Body, node: u32, face: Face) -> f64 {
     let sign = if face.is_max() { 1.0 } else { -1.0 };
     sign * outward(body, node)[face.axis()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate::scene::BuiltIn;
+
+    // Check a body whose contacts are in the middles of a grid's cells, not at its ends.
+    #[test]
+    fn a_map_ends_where_the_body_does() {
+        let scene = BuiltIn::named("liver").unwrap().load();
+        let body = scene.body.as_ref().unwrap().build().unwrap();
+        let naming = Naming::of(&scene, &*body);
+        let rest = body.rest();
+        for grid in ContactGrid::all(&*body, &naming, Some(4), 0) {
+            let axes = grid.axes;
+            let map = grid.map();
+            for (axis, (places, [from, to])) in
+                axes.into_iter().zip([&map.first_m, &map.second_m].into_iter().zip(map.ends_m))
+            {
+                assert!(rest.iter().all(|x| (from..=to).contains(&x[axis])), "{}: {from} to {to}", map.face);
+                assert!(from < places[0] && (places.len() == 1 || places[places.len() - 2] < to), "{}", map.face);
+            }
+        }
+    }
 }

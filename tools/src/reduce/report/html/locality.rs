@@ -83,7 +83,7 @@ fn chapter(locality: &Locality, label: &str, of: fn(&ContactLocality) -> f64) ->
 }
 
 fn face_map(locality: &Locality, face: &FaceMap, scale: &HeatScale, of: fn(&ContactLocality) -> f64) -> String {
-    let [first, second] = [edges(&face.first_m), edges(&face.second_m)];
+    let [first, second] = [edges(&face.first_m, face.ends_m[0]), edges(&face.second_m, face.ends_m[1])];
     let mut cells = Vec::new();
     for (row, y) in second.windows(2).enumerate() {
         for (column, x) in first.windows(2).enumerate() {
@@ -137,13 +137,12 @@ fn in_words(contact: &ContactLocality) -> String {
     )
 }
 
-/// Edges (mm) of the cells around `places` (m), one more than there are places.
-fn edges(places: &[f64]) -> Vec<f64> {
+/// Edges (mm) of the cells around `places` (m), one more than there are places, on a body that ends at `from` and `to`.
+fn edges(places: &[f64], [from, to]: [f64; 2]) -> Vec<f64> {
     let middles = places.windows(2).map(|pair| 500.0 * (pair[0] + pair[1]));
-    let (first, last) = (places[0], places[places.len() - 1]);
-    // The outer places are the body's edges: nothing is drawn beyond. One place alone has a cell of a millimetre.
-    let beyond = if places.len() > 1 { 0.0 } else { 0.5 };
-    [1e3 * first - beyond].into_iter().chain(middles).chain([1e3 * last + beyond]).collect()
+    // A body without extent has a cell of a millimetre.
+    let beyond = if from < to { 0.0 } else { 0.5 };
+    [1e3 * from - beyond].into_iter().chain(middles).chain([1e3 * to + beyond]).collect()
 }
 
 /// What other sizes and what reduced surroundings would do.
@@ -200,8 +199,10 @@ mod tests {
 
     #[test]
     fn cells_lie_around_their_contacts() {
-        assert_eq!(edges(&[0.0, 0.01, 0.03]), [0.0, 5.0, 20.0, 30.0]);
-        assert_eq!(edges(&[0.02]), [19.5, 20.5]);
+        assert_eq!(edges(&[0.0, 0.01, 0.03], [0.0, 0.03]), [0.0, 5.0, 20.0, 30.0]);
+        assert_eq!(edges(&[0.02], [0.02, 0.02]), [19.5, 20.5]);
+        // The middles of cells, the last of which reaches beyond the body.
+        assert_eq!(edges(&[0.005, 0.015, 0.025], [0.0, 0.0275]), [0.0, 10.0, 20.0, 27.5]);
     }
 
     #[test]
