@@ -4,7 +4,7 @@ use palpate::log::magnitude;
 use palpate::runtime::Nanos;
 
 use super::figures::{ComparedRun, Comparison, ForceTrace, Measured};
-use super::milliseconds;
+use super::{latency_in_words, milliseconds};
 use crate::drawing::svg::{Axis, Chart, Line, Mark, Point, Sign};
 
 /// Widths of a chart on a page, and on a narrow one.
@@ -73,7 +73,7 @@ impl<'a> Plots<'a> {
     /// The title of a plot of `what` with results `late`.
     fn title(&self, what: &str, late: Nanos) -> String {
         let of = self.name().map_or(String::new(), |name| format!(" on {name}"));
-        format!("{what}{of}, {}", in_words(late))
+        format!("{what}{of}, global results {}", latency_in_words(self.comparison, late, "at once"))
     }
 
     fn runs(&self, latency: Nanos) -> impl Iterator<Item = (&'a ComparedRun, &'a ForceTrace)> + use<'a> {
@@ -204,12 +204,4 @@ pub(super) fn speed_against_error(comparison: &Comparison, wide: f64) -> String 
 
 fn magnitudes(trace: &ForceTrace) -> impl Iterator<Item = f64> {
     trace.forces_n.iter().copied().map(magnitude)
-}
-
-/// A latency as a plot's title says it.
-fn in_words(latency: Nanos) -> String {
-    match latency {
-        Nanos::ZERO => "global results at once".to_owned(),
-        late => format!("global results {} ms late", milliseconds(late)),
-    }
 }

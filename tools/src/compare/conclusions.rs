@@ -3,7 +3,7 @@
 use palpate::runtime::Nanos;
 
 use super::figures::{ComparedRun, Comparison, Measured};
-use super::{figure, milliseconds, name};
+use super::{figure, latency_in_words, name};
 use crate::units::duration;
 
 /// Costs that differ by less are called the same: they are measured, and differ from run to run.
@@ -92,7 +92,7 @@ fn nearest(comparison: &Comparison, limit: f64) -> String {
         let found = cheapest.and_then(|run| Some((&run.model, run.measured()?))).map(|(model, run)| {
             format!("{model} ({} %, {} per tick)", figure(run.error.rms), duration(run.cost.tick_p50.0))
         });
-        format!("{} {}", in_words(latency), found.unwrap_or_else(|| "none".to_owned()))
+        format!("{} {}", in_words(comparison, latency), found.unwrap_or_else(|| "none".to_owned()))
     };
     let found: Vec<String> = comparison.latencies().into_iter().map(at).collect();
     format!("cheapest tick within {limit} % rms of `full`: {}", found.join("; "))
@@ -116,7 +116,7 @@ fn list(comparison: &Comparison, asked: &dyn Fn(&Measured) -> bool) -> Vec<Strin
     let all = |model: &str| runs().filter(|(run, _)| run.model == model).all(|(_, measured)| asked(measured));
     let names = runs().filter(|(_, measured)| asked(measured)).map(|(run, _)| match all(&run.model) {
         true => run.model.clone(),
-        false => format!("{} ({})", run.model, in_words(run.latency)),
+        false => format!("{} ({})", run.model, in_words(comparison, run.latency)),
     });
     let mut names: Vec<String> = names.collect();
     names.dedup();
@@ -124,11 +124,8 @@ fn list(comparison: &Comparison, asked: &dyn Fn(&Measured) -> bool) -> Vec<Strin
 }
 
 /// A latency in a sentence.
-fn in_words(latency: Nanos) -> String {
-    match latency {
-        Nanos::ZERO => "in time".to_owned(),
-        late => format!("{} ms late", milliseconds(late)),
-    }
+fn in_words(comparison: &Comparison, latency: Nanos) -> String {
+    latency_in_words(comparison, latency, "in time")
 }
 
 /// A count with two digits that mean something.
@@ -213,6 +210,20 @@ mod tests {
             Comparison::conclusions(&comparison(100, &[("patch", 33, run)]))
                 .concat()
                 .contains("patch 33 ms late: 3 releases")
+        );
+    }
+
+    // Check that results are not said to be in time where they come over a link.
+    #[test]
+    fn over_a_link_a_latency_is_what_is_added_to_it() {
+        let runs = [("hold", 0, measured(0.5, 2, 0.2)), ("hold", 33, measured(6.0, 1, 0.01))];
+        let link = palpate::scene::LinkSpec { delay_ms: 33.0, ..Default::default() };
+        let comparison = Comparison { link: Some(link), ..comparison(100, &runs) };
+        let text = comparison.conclusions().join("\n");
+        assert!(!text.contains("in time") && !text.contains("ms late"), "{text}");
+        assert!(
+            text.contains("hold (with 33 ms added)") && text.contains("`full`: with nothing added hold ("),
+            "{text}"
         );
     }
 }

@@ -2,6 +2,7 @@
 
 use palpate::log::{LogRecord, Magnitudes, Resync, ServedBy, magnitude};
 use palpate::runtime::Nanos;
+use palpate::scene::LinkSpec;
 
 /// The part of a run that a comparison needs: force and energy of every haptic tick, and the resyncs.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -256,6 +257,8 @@ pub struct Comparison {
     pub haptic_period: Nanos,
     /// Time from one release of the global model to the next.
     pub global_period: Nanos,
+    /// The link of the scene, over which the global model of every run but `full`'s works: results are late without a compute latency.
+    pub link: Option<LinkSpec>,
     /// Simulated time of each run.
     pub duration: Nanos,
     /// Time that reading the clock adds to each tick and each build.

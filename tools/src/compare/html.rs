@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::charts::{Plots, WIDTHS, colour, models, speed_against_error};
 use super::figures::Comparison;
-use super::table::{COLUMNS, cell, clock, facts, rows};
+use super::table::{COLUMNS, cell, clock, facts, latency_head, rows};
 use crate::drawing::html::{escaped, page, sentence};
 
 /// The comparison as an HTML page that needs nothing else: no network, no script.
@@ -33,7 +33,11 @@ fn head(body: &mut String, comparison: &Comparison) {
 }
 
 fn table(body: &mut String, comparison: &Comparison) {
-    body.push_str("<h2>Error and cost</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>model</th><th>late<br>ms</th>");
+    let late = latency_head(comparison);
+    let _ = write!(
+        body,
+        "<h2>Error and cost</h2>\n<div class=\"wide\"><table>\n<thead><tr><th>model</th><th>{late}<br>ms</th>"
+    );
     for column in &COLUMNS {
         let _ = write!(body, "<th title=\"{}\">{}</th>", escaped(column.meaning), column.head.join("<br>"));
     }
@@ -79,11 +83,12 @@ fn plots(body: &mut String, comparison: &Comparison) -> String {
         let _ = writeln!(body, "<div class=\"narrow\">\n{narrow}</div>");
         let _ = writeln!(body, "<figcaption>{}</figcaption></figure>", sentence(caption));
     };
-    figure(
-        "speed",
-        WIDTHS.map(|wide| speed_against_error(comparison, wide)),
-        "Left is cheaper, down is nearer to `full`. Filled: results of the global model are there at once; hollow: late.",
-    );
+    let [filled, hollow] = match comparison.link {
+        None => ["results of the global model are there at once", "late"],
+        Some(_) => ["nothing is added to what the link makes late", "a latency is"],
+    };
+    let caption = format!("Left is cheaper, down is nearer to `full`. Filled: {filled}; hollow: {hollow}.");
+    figure("speed", WIDTHS.map(|wide| speed_against_error(comparison, wide)), &caption);
     for device in 0..comparison.full.devices.len() {
         let plots = Plots::new(comparison, device);
         for (number, latency) in comparison.latencies().into_iter().enumerate() {
@@ -116,10 +121,17 @@ mod tests {
             ComparedRun { model: "patch".into(), latency: Nanos(33_340_000), outcome },
             ComparedRun { model: "hold".into(), latency: Nanos::ZERO, outcome: RunOutcome::Measured(Box::default()) },
         ];
-        let page = to_html(&Comparison { scene: "a&b".into(), runs, ..Comparison::default() });
+        let mut comparison = Comparison { scene: "a&b".into(), runs, ..Comparison::default() };
+        let page = to_html(&comparison);
         assert!(page.contains("<td class=\"why\" colspan=\"11\">too &lt;large&gt;</td>"), "{page}");
         assert_eq!(page.matches("<div class=\"broad\">").count(), page.matches("<div class=\"narrow\">").count());
         assert!(page.contains("viewBox=\"0 0 400 400\""), "a phone has its own");
+        assert!(page.contains("results of the global model are there at once"), "{page}");
         assert!(page.contains("nothing to compare") && page.contains("a&amp;b") && !page.contains("NaN"), "{page}");
+        // A link makes them late.
+        comparison.link = Some(palpate::scene::LinkSpec::default());
+        comparison.full.devices = vec![super::super::figures::MeasuredDevice::default()];
+        let page = to_html(&comparison);
+        assert!(page.contains("global results with nothing added") && !page.contains("at once"), "{page}");
     }
 }

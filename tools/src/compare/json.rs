@@ -7,6 +7,7 @@
 //! | --- | --- |
 //! | `schema_version` | 1 |
 //! | `scene`, `nodes`, `haptic_period_ns`, `global_period_ns`, `duration_s` | what was compared |
+//! | `link` | the scene's simulated link with the names of `[link]`; every `latency_ms` comes on top of it; `null` without |
 //! | `palpate_version`, `instruction_set`, `debug_build`, `clock_ns` | what measured; `clock_ns` is in every tick and build |
 //! | `peak_n`, `largest_energy_j` | of `full`: the whole of all percentages |
 //! | `full_fits_tick` | whether the p99 of `full`'s tick is within the haptic period |
@@ -38,6 +39,7 @@ pub fn to_json(comparison: &Comparison) -> String {
         "haptic_period_ns": comparison.haptic_period.0,
         "global_period_ns": comparison.global_period.0,
         "duration_s": comparison.duration.as_secs_f64(),
+        "link": comparison.link,
         "debug_build": comparison.is_debug_build,
         "palpate_version": comparison.palpate_version,
         "instruction_set": comparison.instruction_set,
@@ -130,6 +132,10 @@ mod tests {
             (&false.into(), &"it diverged".into(), &33.34.into())
         );
         assert!(row["error_percent"].is_null() && row["cost"].is_null() && row["degraded"].is_null(), "{row}");
+        assert_eq!(document["link"], Value::Null);
+        comparison.link = Some(palpate::scene::LinkSpec { delay_ms: 33.0, ..Default::default() });
+        let document: Value = serde_json::from_str(&to_json(&comparison)).unwrap();
+        assert_eq!(document["link"]["delay_ms"], 33.0);
         // Without a force there is no percentage, and JSON has no NaN.
         assert_eq!(document["models"][0]["error_percent"]["rms"], Value::Null);
     }

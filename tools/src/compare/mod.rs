@@ -31,6 +31,16 @@ fn name(run: &ComparedRun) -> String {
     }
 }
 
+/// A compute latency in words, `none` where there is none: what a link of the scene makes late comes on top of it.
+fn latency_in_words(comparison: &Comparison, latency: Nanos, none: &str) -> String {
+    match (latency, &comparison.link) {
+        (Nanos::ZERO, None) => none.to_owned(),
+        (Nanos::ZERO, Some(_)) => "with nothing added".to_owned(),
+        (late, None) => format!("{} ms late", milliseconds(late)),
+        (late, Some(_)) => format!("with {} ms added", milliseconds(late)),
+    }
+}
+
 /// A figure of at most six characters: three digits, more before the point if it takes them.
 fn figure(value: f64) -> String {
     match value.abs() {

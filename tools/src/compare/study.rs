@@ -183,6 +183,7 @@ fn about(scene: &Scene, global: Rate) -> Result<Comparison, Error> {
         nodes: scene.body.as_ref().map_or(0, BodySpec::node_count),
         haptic_period: haptic.period(),
         global_period: global.period(),
+        link: scene.link.clone(),
         clock: Stopwatch::reading(),
         is_debug_build: cfg!(debug_assertions),
         palpate_version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -3,6 +3,8 @@
 use super::figures::{Comparison, ForceDeviation, Measured, MeasuredDevice, ModelCost};
 use super::{figure, milliseconds};
 use crate::units::{duration, force};
+use palpate::runtime::{Nanos, Rate};
+use palpate::scene::LinkSpec;
 
 /// A column: three lines of head, its width in text, what it means, and its figure.
 pub(super) struct Column {
@@ -146,21 +148,30 @@ pub(super) const COLUMNS: [Column; 11] = [
 pub fn to_text(comparison: &Comparison) -> String {
     let mut lines = vec![facts(comparison), String::new()];
     for line in 0..3 {
-        let (model, latency) = [("", ""), ("model", "late"), ("", "ms")][line];
+        let (model, latency) = [("", ""), ("model", latency_head(comparison)), ("", "ms")][line];
         lines.push(self::line(model, latency, COLUMNS.iter().map(|column| column.head[line].to_owned())));
     }
-    lines.extend(rows(comparison).map(|row| {
-        let name = if row.is_of_device() { format!("  {}", row.name) } else { row.name.to_owned() };
-        match &row.figures {
+    for row in rows(comparison) {
+        let mut name = if row.is_of_device() { format!("  {}", row.name) } else { row.name.to_owned() };
+        // A name that would move the figures has a line of its own.
+        if name.chars().count() > MODEL_WIDTH {
+            lines.push(std::mem::take(&mut name));
+        }
+        lines.push(match &row.figures {
             Ok(figures) => line(&name, &row.late, COLUMNS.iter().map(|column| cell(column, figures))),
             Err(why) => line(&name, &row.late, [format!("  {why}")].into_iter()),
-        }
-    }));
+        });
+    }
     lines.push(String::new());
     lines.extend(comparison.conclusions());
     lines.push(String::new());
     lines.push(format!("{}; {MEANINGS}", clock(comparison)));
     lines.iter().map(|line| wrapped(line)).collect()
+}
+
+/// The head of the latencies: what a link makes late is not among them.
+pub(super) fn latency_head(comparison: &Comparison) -> &'static str {
+    if comparison.link.is_some() { "added" } else { "late" }
 }
 
 /// On as many lines as it takes, those after the first indented.
@@ -188,16 +199,32 @@ fn wrapped(line: &str) -> String {
 
 /// What was compared, in one line.
 pub(super) fn facts(comparison: &Comparison) -> String {
-    let hz = |period: palpate::runtime::Nanos| format!("{:.0} Hz", 1.0 / period.as_secs_f64());
     format!(
-        "{}: {} nodes, {:.3} s simulated at {} and {}, largest force of full {}",
+        "{}: {} nodes, {:.3} s simulated at {} and {}{}, largest force of full {}",
         comparison.scene,
         comparison.nodes,
         comparison.duration.as_secs_f64(),
-        hz(comparison.haptic_period),
-        hz(comparison.global_period),
+        rate(comparison.haptic_period),
+        rate(comparison.global_period),
+        comparison.link.as_ref().map_or(String::new(), over),
         peaks(&comparison.full)
     )
+}
+
+/// The rate with the fewest decimals that has this period.
+fn rate(period: Nanos) -> String {
+    let hz = 1.0 / period.as_secs_f64();
+    let rounded = [1.0, 10.0, 100.0, 1e3].map(|parts| (parts * hz).round() / parts);
+    let found = rounded.into_iter().find(|hz| Rate::from_hz(*hz).is_some_and(|rate| rate.period() == period));
+    format!("{} Hz", found.unwrap_or(rounded[3]))
+}
+
+/// The link that makes results late without a compute latency.
+fn over(link: &LinkSpec) -> String {
+    let LinkSpec { delay_ms, jitter_ms, loss, .. } = link;
+    let up_to = if *jitter_ms > 0.0 { format!(" to {}", delay_ms + jitter_ms) } else { String::new() };
+    let lost = if *loss > 0.0 { format!(", {} % lost", figure(100.0 * loss)) } else { String::new() };
+    format!(" over a link of {delay_ms}{up_to} ms each way{lost}")
 }
 
 /// The largest force, of each device if there are several.
@@ -250,5 +277,33 @@ mod tests {
         assert!(text.lines().all(|line| line.len() <= WIDTH), "{text}");
         assert!(text.contains("\n    large is too large is too large"), "{text}");
         assert_eq!(wrapped(&"x".repeat(120)), "x".repeat(120) + "\n");
+    }
+
+    #[test]
+    fn a_long_name_of_a_device_moves_no_figure() {
+        let device = |name: &str| MeasuredDevice { name: name.into(), ..MeasuredDevice::default() };
+        let devices = vec![device("left"), device("the_right_hand_of_the_surgeon")];
+        let full = Measured::new(ModelCost::default(), 0, devices);
+        let text = to_text(&Comparison { full, ..Comparison::default() });
+        let short = text.lines().find(|line| line.starts_with("  left ")).unwrap();
+        let long = text.split("  the_right_hand_of_the_surgeon\n").last().unwrap().lines().next().unwrap();
+        assert_eq!(long.trim_start(), short["  left".len()..].trim_start(), "{text}");
+        assert_eq!(long.len(), short.len(), "{text}");
+    }
+
+    #[test]
+    fn the_head_has_the_rates_as_they_are_and_the_link() {
+        let of = |hz: f64| rate(Rate::from_hz(hz).unwrap().period());
+        let rates = [1000.0, 30.0, 12.5, 29.97, 3000.0, 0.125].map(of);
+        assert_eq!(rates, ["1000 Hz", "30 Hz", "12.5 Hz", "29.97 Hz", "3000 Hz", "0.125 Hz"]);
+        let link = LinkSpec { delay_ms: 33.0, loss: 0.01, ..LinkSpec::default() };
+        assert_eq!(over(&link), " over a link of 33 ms each way, 1.00 % lost");
+        assert_eq!(
+            over(&LinkSpec { jitter_ms: 4.5, loss: 0.0, ..link.clone() }),
+            " over a link of 33 to 37.5 ms each way"
+        );
+        let comparison = Comparison { link: Some(link), ..Comparison::default() };
+        assert!(facts(&comparison).contains(" Hz over a link of 33 ms each way, 1.00 % lost, largest force"));
+        assert!(to_text(&comparison).contains("added"));
     }
 }
