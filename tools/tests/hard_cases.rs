@@ -1,5 +1,7 @@
 //! Whole sessions in situations in which simulations usually fail: each local model against `full`, in virtual time.
 
+#[path = "../examples/hard_cases/arguments.rs"]
+mod arguments;
 #[path = "../examples/hard_cases/cases/mod.rs"]
 #[allow(dead_code, reason = "what is hard about a case is for the table")]
 mod cases;
@@ -7,6 +9,7 @@ mod cases;
 #[allow(dead_code, reason = "the example prints what is only compared here")]
 mod measure;
 
+use arguments::Asked;
 use cases::{Bound, Case, Upset};
 use measure::{MAX_FORCE_N, Measured, Traced};
 use palpate::log::LogRecord;
@@ -21,6 +24,20 @@ use palpate::scene::Scene;
 fn scene(name: &str) -> Scene {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/hard");
     Scene::load(&folder.join(name).with_extension("toml")).unwrap()
+}
+
+#[test]
+fn the_example_takes_no_case_or_option_that_there_is_not_and_keeps_the_table_of_the_docs() {
+    let read = |arguments: &[&str]| {
+        Asked::read(arguments.iter().map(|argument| (*argument).to_owned()), &["impact", "impact_hard", "teleport"])
+    };
+    let all = Asked { all: true, ..Asked::default() };
+    assert_eq!((read(&[]), read(&["--all"])), (Ok(Asked::default()), Ok(all)));
+    let names = vec!["tele".to_owned(), "impact".to_owned()];
+    assert_eq!(read(&["tele", "--bounds", "impact"]), Ok(Asked { names, bounds: true, ..Asked::default() }));
+    for refused in [&["impcat"][..], &["--dcos"], &["--bounds", "--docs"], &["--docs", "--bounds", "--all"]] {
+        assert!(read(refused).is_err(), "{refused:?}");
+    }
 }
 
 /// What holds of every run, whatever is done to it.

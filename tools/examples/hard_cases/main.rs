@@ -4,6 +4,7 @@
 //! all, which takes minutes, and `-- --docs` also writes them to docs/hard_cases.md. `--bounds` prints what bounds are made from.
 //! Nothing in it depends on time, so it is the same on every machine up to rounding.
 
+mod arguments;
 #[allow(dead_code, reason = "the bounds are for tools/tests/hard_cases.rs")]
 mod cases;
 #[allow(dead_code, reason = "what tools/tests/hard_cases.rs checks is not in the table")]
@@ -12,6 +13,7 @@ mod measure;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use arguments::Asked;
 use cases::{Case, KINDS, Run, Setup};
 use measure::{Measured, Traced};
 use palpate::Error;
@@ -28,15 +30,11 @@ const DOCUMENTED: [LocalModelKind; 3] =
 const QUICK: [&str; 4] = ["impact", "teleport", "half", "vertex"];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let asked = |option: &str| arguments.iter().any(|argument| argument == option);
-    let (only_bounds, docs) = (asked("--bounds"), asked("--docs"));
-    let mut names: Vec<&str> = arguments.iter().map(String::as_str).filter(|name| !name.starts_with("--")).collect();
-    if names.is_empty() {
-        names = QUICK.to_vec();
-    }
+    let known: Vec<&str> = KINDS.into_iter().flatten().map(|case| case.name).collect();
+    let Asked { names, all, docs, bounds: only_bounds } = Asked::read(std::env::args().skip(1), &known)?;
+    let names: Vec<&str> = if names.is_empty() { QUICK.to_vec() } else { names.iter().map(String::as_str).collect() };
     let bases = tempfile::tempdir()?;
-    let all = docs || asked("--all");
+    let all = docs || all;
     let mut document = String::from("| case | what is hard |");
     DOCUMENTED.iter().for_each(|model| document += &format!(" `{}` |", model.name()));
     document += "\n| --- | --- | --- | --- | --- |\n";
