@@ -315,7 +315,7 @@ impl Seek for Counted<'_> {
 // Check that an index of a thousand records, each of which claims the rest of the file, does not have the file read for each.
 #[test]
 fn records_within_records_that_an_index_lists_are_read_once() {
-    let (heads, start) = (1000, head().len() as u64);
+    let (heads, start) = (1000_u64, head().len() as u64);
     let mut data = head();
     let length = 9 * heads;
     for number in 1..=heads {
