@@ -3,11 +3,10 @@
 use std::collections::VecDeque;
 
 use bytes::Bytes;
+use serde_json::Value;
 
 /// Blocks of samples that wait for a slow browser: three seconds of them.
 const MOST_SAMPLES: usize = 60;
-/// Texts that wait: a browser that takes none for so long is shown the newest.
-const MOST_TEXTS: usize = 32;
 
 /// A message to a browser.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +18,8 @@ pub(crate) enum Outgoing {
 /// Messages for one browser. A newer picture takes the place of one that was not taken.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
-    texts: VecDeque<String>,
+    /// The newest of each kind: the page has no use for what was said before it, and it can push out no other kind.
+    texts: VecDeque<Value>,
     /// Topology, surface and tools, in this order.
     newest: [Option<Bytes>; 3],
     samples: VecDeque<Bytes>,
@@ -40,12 +40,11 @@ pub(crate) enum Picture {
 }
 
 impl Outbox {
-    pub(crate) fn say(&mut self, text: String) {
-        if self.texts.len() == MOST_TEXTS {
-            self.texts.pop_front();
-            self.dropped += 1;
-        }
-        self.texts.push_back(text);
+    pub(crate) fn say(&mut self, message: Value) {
+        let before = self.texts.len();
+        self.texts.retain(|old| old["kind"] != message["kind"]);
+        self.dropped += (before - self.texts.len()) as u64;
+        self.texts.push_back(message);
     }
 
     pub(crate) fn show(&mut self, picture: Picture, bytes: Bytes) {
@@ -74,8 +73,8 @@ impl Outbox {
 
     /// The next message to send.
     pub(crate) fn take(&mut self) -> Option<Outgoing> {
-        if let Some(text) = self.texts.pop_front() {
-            return Some(Outgoing::Text(text));
+        if let Some(message) = self.texts.pop_front() {
+            return Some(Outgoing::Text(message.to_string()));
         }
         let picture = self.newest.iter_mut().find_map(Option::take);
         picture.or_else(|| self.samples.pop_front()).map(Outgoing::Bytes)
@@ -84,20 +83,35 @@ impl Outbox {
 
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
     fn a_browser_that_takes_nothing_for_a_minute_gets_the_newest_and_costs_no_more() {
         let mut outbox = Outbox::default();
         for n in 0_u32..3600 {
-            outbox.say(n.to_string());
+            outbox.say(json!({ "kind": "stats", "n": n }));
             outbox.show(Picture::Surface, Bytes::copy_from_slice(&n.to_le_bytes()));
             outbox.plot(Bytes::copy_from_slice(&n.to_le_bytes()));
         }
         let taken: Vec<_> = std::iter::from_fn(|| outbox.take()).collect();
-        assert_eq!(taken.len(), MOST_TEXTS + 1 + MOST_SAMPLES);
-        assert_eq!(taken[MOST_TEXTS - 1], Outgoing::Text("3599".into()));
-        assert_eq!(taken[MOST_TEXTS], Outgoing::Bytes(Bytes::copy_from_slice(&3599_u32.to_le_bytes())));
+        assert_eq!(taken.len(), 1 + 1 + MOST_SAMPLES);
+        assert_eq!(taken[0], Outgoing::Text(json!({ "kind": "stats", "n": 3599 }).to_string()));
+        assert_eq!(taken[1], Outgoing::Bytes(Bytes::copy_from_slice(&3599_u32.to_le_bytes())));
         assert_eq!(outbox.dropped, 3 * 3600 - taken.len() as u64);
+    }
+
+    #[test]
+    fn what_is_said_once_is_not_pushed_out_by_what_is_said_every_second() {
+        let mut outbox = Outbox::default();
+        let role = |role: &str| json!({ "kind": "role", "role": role });
+        outbox.say(role("watch"));
+        outbox.say(json!({ "kind": "settings" }));
+        outbox.say(role("hand"));
+        (0..40).for_each(|n| outbox.say(json!({ "kind": "stats", "n": n })));
+        let taken: Vec<_> = std::iter::from_fn(|| outbox.take()).collect();
+        let expected = [json!({ "kind": "settings" }), role("hand"), json!({ "kind": "stats", "n": 39 })];
+        assert_eq!(taken, expected.map(|message| Outgoing::Text(message.to_string())));
     }
 }

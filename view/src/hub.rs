@@ -110,7 +110,7 @@ impl Hub {
         if state.hand == Some(browser.number) {
             state.hand = state.browsers.first().map(|first| first.number);
             if let Some(next) = state.browsers.first() {
-                next.outbox().say(json!({ "kind": "role", "role": "hand" }).to_string());
+                next.outbox().say(json!({ "kind": "role", "role": "hand" }));
             }
         }
     }
@@ -162,9 +162,9 @@ impl Hub {
     /// What can be changed has become `settings`, for everybody and whoever comes.
     pub(crate) fn set(&self, settings: Value) {
         let state = &mut *locked(&self.state);
-        let text = json!({ "kind": "settings", "settings": settings }).to_string();
+        let message = json!({ "kind": "settings", "settings": settings });
         state.hello["settings"] = settings;
-        state.browsers.iter().for_each(|browser| browser.outbox().say(text.clone()));
+        state.browsers.iter().for_each(|browser| browser.outbox().say(message.clone()));
     }
 
     /// True if a browser shows the stress of the body.
@@ -190,8 +190,7 @@ impl Hub {
     }
 
     pub(crate) fn say(&self, message: &Value) {
-        let text = message.to_string();
-        locked(&self.state).browsers.iter().for_each(|browser| browser.outbox().say(text.clone()));
+        locked(&self.state).browsers.iter().for_each(|browser| browser.outbox().say(message.clone()));
     }
 
     /// Shows one browser what it asked for.
@@ -239,7 +238,7 @@ fn greet(state: &State, browser: &Browser) {
     hello["key"] = browser.key.text().into();
     hello["role"] = if state.hand == Some(browser.number) { "hand" } else { "watch" }.into();
     let mut outbox = browser.outbox();
-    outbox.say(hello.to_string());
+    outbox.say(hello);
     outbox.show(Picture::Topology, state.topology.clone());
     if !state.surface.is_empty() {
         outbox.show(Picture::Surface, state.surface.clone());

@@ -197,7 +197,7 @@ impl Playback {
             outbox.show(Picture::Tools, tools);
             if is_jump {
                 outbox.forget_samples();
-                outbox.say(json!({ "kind": "clear" }).to_string());
+                outbox.say(json!({ "kind": "clear" }));
             }
             for (&device, track) in &self.tracks {
                 let rows = within(&track.rows, samples, |row| row.0);

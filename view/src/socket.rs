@@ -8,6 +8,7 @@ use std::net::TcpStream;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use serde_json::json;
 use tungstenite::protocol::{CloseFrame, Role, WebSocketConfig, frame::coding::CloseCode};
 use tungstenite::{Error, Message, Utf8Bytes, WebSocket};
 
@@ -28,9 +29,6 @@ const GONE: Duration = Duration::from_secs(90);
 const ASK: Duration = Duration::from_secs(20);
 /// A page hears something at least this often, so that it knows a connection that is dead.
 const BEAT: Duration = Duration::from_secs(2);
-
-/// What is said when there is nothing to say.
-const HERE: &str = r#"{"kind":"here"}"#;
 
 /// Messages that a browser may send at once, and per second: a page sends one per picture of its screen.
 const BURST: f64 = 400.0;
@@ -155,7 +153,7 @@ fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Opti
             is_sent = has_gone(socket.send(Message::Ping(bytes::Bytes::new())))?;
         }
         if is_sent && said.elapsed() > BEAT {
-            browser.outbox().say(HERE.to_owned());
+            browser.outbox().say(json!({ "kind": "here" }));
         }
         // Nothing new is handed over before the last message has gone: so no more than one waits here.
         while is_sent && let Some(message) = { browser.outbox().take() } {
