@@ -1,9 +1,9 @@
 //! One browser: what it says is read, what waits for it is sent, and it may take its time within bounds.
 //!
-//! A read waits for a few milliseconds, then it is looked whether something is to be sent. A browser that stops reading stops
-//! its own thread alone, and that for moments: what could not be sent is tried again, and only the newest picture waits.
+//! By turns it is read for some milliseconds and sent for some, whatever else there is to read or to send. A browser that stops
+//! reading stops its own thread alone, and that for moments: what could not be sent is tried again, and only the newest picture waits.
 
-use std::io;
+use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -19,9 +19,11 @@ use crate::wish::Wish;
 
 /// A message of the page has a hundred bytes.
 const MOST_BYTES: usize = 4 << 10;
-/// How long a read waits before it is looked whether something is to be sent.
+/// A message may come in fragments, of which each has a head: so much before it is whole.
+const MOST_UNFINISHED: usize = 2 * MOST_BYTES;
+/// How long it is read before something is sent.
 const LOOK: Duration = Duration::from_millis(4);
-/// How long a write waits for a browser that does not read.
+/// How long something is sent before it is read, and how long a write waits for a browser that does not read.
 const PUSH: Duration = Duration::from_millis(20);
 /// A browser that has taken nothing or not answered for so long is gone, or may come again.
 const GONE: Duration = Duration::from_secs(90);
@@ -67,13 +69,55 @@ impl Allowance {
     }
 }
 
+/// A browser's stream. Fragments of which none is the last are read on and on without a message, and a long message is written on and on
+/// over a slow link: by these bounds that ends.
+struct Bounded {
+    stream: TcpStream,
+    /// Nothing is read or written after it.
+    until: Instant,
+    /// Bytes that may come before a message is whole.
+    left: usize,
+}
+
+impl Bounded {
+    fn is_in_time(&self) -> io::Result<()> {
+        if Instant::now() < self.until { Ok(()) } else { Err(io::ErrorKind::WouldBlock.into()) }
+    }
+}
+
+impl Read for Bounded {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        if self.left == 0 {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        self.is_in_time()?;
+        let count = self.stream.read(to)?;
+        self.left = self.left.saturating_sub(count);
+        Ok(count)
+    }
+}
+
+impl Write for Bounded {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.is_in_time()?;
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+type Socket = WebSocket<Bounded>;
+
 /// Serves a browser that asked for a socket, until it goes, says what it may not, or the server ends.
 pub(crate) fn serve(stream: TcpStream, rest: Vec<u8>, hub: &Hub) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(LOOK))?;
     stream.set_write_timeout(Some(PUSH))?;
     let config = WebSocketConfig::default().max_message_size(Some(MOST_BYTES)).max_frame_size(Some(MOST_BYTES));
-    let mut socket = WebSocket::from_partially_read(stream, rest, Role::Server, Some(config));
+    let stream = Bounded { stream, until: Instant::now(), left: MOST_UNFINISHED };
+    let mut socket = Socket::from_partially_read(stream, rest, Role::Server, Some(config));
     let Some(browser) = enter(&mut socket, hub) else { return Ok(()) };
     let farewell = talk(&mut socket, &browser, hub);
     hub.leave(&browser);
@@ -83,8 +127,16 @@ pub(crate) fn serve(stream: TcpStream, rest: Vec<u8>, hub: &Hub) -> io::Result<(
     Ok(())
 }
 
+/// The next message, if it is whole before `until`; otherwise an error that [is a wait](is_wait).
+fn read(socket: &mut Socket, until: Instant) -> Result<Message, Error> {
+    socket.get_mut().until = until;
+    let message = socket.read()?;
+    socket.get_mut().left = MOST_UNFINISHED;
+    Ok(message)
+}
+
 /// Waits for the token, and lets the browser in.
-fn enter(socket: &mut WebSocket<TcpStream>, hub: &Hub) -> Option<Arc<Browser>> {
+fn enter(socket: &mut Socket, hub: &Hub) -> Option<Arc<Browser>> {
     let begin = Instant::now();
     let farewell = loop {
         if hub.is_over() {
@@ -93,7 +145,7 @@ fn enter(socket: &mut WebSocket<TcpStream>, hub: &Hub) -> Option<Arc<Browser>> {
         if begin.elapsed() >= PATIENCE {
             break SILENT;
         }
-        match socket.read() {
+        match read(socket, Instant::now() + LOOK) {
             Ok(Message::Text(text)) => match Wish::read(&text) {
                 Some(Wish::Enter { token, again }) if hub.token.is(&token) => match hub.enter(again.as_deref()) {
                     Some(browser) => return Some(browser),
@@ -110,8 +162,35 @@ fn enter(socket: &mut WebSocket<TcpStream>, hub: &Hub) -> Option<Arc<Browser>> {
     None
 }
 
+/// Does what the browser says in a [`LOOK`]; true if it said anything. An error ends the connection, with these words.
+fn listen(
+    socket: &mut Socket,
+    browser: &Browser,
+    hub: &Hub,
+    allowance: &mut Allowance,
+) -> Result<bool, Option<Farewell>> {
+    let until = Instant::now() + LOOK;
+    let mut has_said = false;
+    loop {
+        match read(socket, until) {
+            Ok(_) if !allowance.take(Instant::now()) => return Err(Some(FLOOD)),
+            Ok(Message::Text(text)) => match Wish::read(&text) {
+                Some(wish) if !matches!(wish, Wish::Enter { .. }) => hub.wish(browser.number, wish),
+                _ => return Err(Some(NO_MESSAGE)),
+            },
+            Ok(Message::Ping(_) | Message::Pong(_)) => {}
+            Ok(Message::Close(_)) => return Err(None),
+            Ok(_) => return Err(Some(NO_MESSAGE)),
+            Err(error) if is_wait(&error) => return Ok(has_said),
+            Err(Error::Capacity(_)) => return Err(Some(TOO_LONG)),
+            Err(_) => return Err(None),
+        }
+        has_said = true;
+    }
+}
+
 /// Reads and sends until the browser goes, or until it is sent away.
-fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Option<Farewell> {
+fn talk(socket: &mut Socket, browser: &Browser, hub: &Hub) -> Option<Farewell> {
     let begin = Instant::now();
     let mut allowance = Allowance::new(begin);
     let (mut is_sent, mut moved, mut said, mut asked, mut heard) = (true, begin, begin, begin, begin);
@@ -122,31 +201,23 @@ fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Opti
         if browser.outbox().is_replaced {
             return Some(REPLACED);
         }
-        let read = socket.read();
-        if read.is_ok() {
-            heard = Instant::now();
-        }
-        match read {
-            Ok(_) if !allowance.take(heard) => return Some(FLOOD),
-            Ok(Message::Text(text)) => match Wish::read(&text) {
-                Some(wish) if !matches!(wish, Wish::Enter { .. }) => hub.wish(browser.number, wish),
-                _ => return Some(NO_MESSAGE),
-            },
-            Ok(Message::Ping(_) | Message::Pong(_)) => {}
-            Ok(Message::Close(_)) => return None,
-            Ok(_) => return Some(NO_MESSAGE),
-            Err(error) if is_wait(&error) => {}
-            Err(Error::Capacity(_)) => return Some(TOO_LONG),
-            Err(_) => return None,
+        match listen(socket, browser, hub, &mut allowance) {
+            Ok(true) => heard = Instant::now(),
+            Ok(false) => {}
+            Err(farewell) => return farewell,
         }
         if heard.elapsed() > GONE {
             return None;
         }
+        // Over a slow link there is always more to send, and the hand is heard all the same.
+        socket.get_mut().until = Instant::now() + PUSH;
         if !is_sent {
             is_sent = has_gone(socket.flush())?;
-            if !is_sent && moved.elapsed() >= GONE {
-                return None;
-            }
+        }
+        if is_sent {
+            moved = Instant::now();
+        } else if moved.elapsed() >= GONE {
+            return None;
         }
         if is_sent && asked.elapsed() > ASK {
             asked = Instant::now();
@@ -164,9 +235,6 @@ fn talk(socket: &mut WebSocket<TcpStream>, browser: &Browser, hub: &Hub) -> Opti
             is_sent = has_gone(socket.send(message))?;
             said = Instant::now();
             hub.count_sent(length);
-        }
-        if is_sent {
-            moved = Instant::now();
         }
     }
 }
@@ -187,19 +255,23 @@ fn is_wait(error: &Error) -> bool {
 }
 
 /// Says why, and goes, whether it is heard or not.
-fn close(socket: &mut WebSocket<TcpStream>, (code, words): Farewell) {
+fn close(socket: &mut Socket, (code, words): Farewell) {
     let frame = CloseFrame { code, reason: Utf8Bytes::from_static(words) };
+    let until = Instant::now() + PATIENCE / 6;
+    socket.get_mut().until = until;
     let _ = socket.close(Some(frame));
     let _ = socket.flush();
-    let _ = socket.get_ref().shutdown(std::net::Shutdown::Write);
+    let _ = socket.get_ref().stream.shutdown(std::net::Shutdown::Write);
     // What is still on the way is read, so that the words are not thrown away with the connection.
-    let begin = Instant::now();
-    while begin.elapsed() < PATIENCE / 6 && socket.read().is_ok_and(|message| !message.is_close()) {}
+    while Instant::now() < until && read(socket, until).is_ok_and(|message| !message.is_close()) {}
 }
 
 #[cfg(test)]
 mod tests {
+    use serde_json::Value;
+
     use super::*;
+    use crate::client::Picture;
 
     #[test]
     fn a_page_may_send_one_message_per_picture_and_no_flood() {
@@ -211,5 +283,47 @@ mod tests {
         let taken = (0..1000).take_while(|_| flood.take(begin)).count();
         assert_eq!(taken, BURST as usize);
         assert!(flood.take(begin + Duration::from_secs(10)), "it fills again");
+    }
+
+    #[test]
+    fn a_hand_behind_a_slow_link_is_heard_at_once() {
+        let (sender, wishes) = std::sync::mpsc::channel();
+        let hub = Hub::new(crate::guard::Token::new().unwrap(), sender);
+        let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let near = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let far = listener.accept().unwrap().0;
+        let mut hand = WebSocket::from_raw_socket(near.try_clone().unwrap(), Role::Client, None);
+        let mut say = |message| hand.send(Message::Text(Value::to_string(&message).into())).unwrap();
+        say(json!({ "do": "enter", "token": hub.token.text() }));
+        std::thread::scope(|scope| {
+            scope.spawn(|| serve(far, Vec::new(), &hub));
+            // Some of what is shown is read now and then, and there is always more.
+            scope.spawn(|| {
+                let mut part = vec![0; 64 << 10];
+                while (&near).read(&mut part).is_ok_and(|count| count > 0) {
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+            });
+            scope.spawn(|| {
+                let bytes = bytes::Bytes::from(vec![0; 128 << 10]);
+                while !hub.wait(Duration::from_millis(1)) {
+                    [Picture::Topology, Picture::Surface, Picture::Tools]
+                        .iter()
+                        .for_each(|&kind| hub.show(kind, &bytes));
+                }
+            });
+            // What the system holds between the two is full.
+            while hub.traffic().1 < 16 << 20 {
+                std::thread::yield_now();
+            }
+            for time in 0..200 {
+                say(json!({ "do": "seek", "time": time }));
+            }
+            let begin = Instant::now();
+            let heard = || wishes.recv_timeout(Duration::from_secs(2).saturating_sub(begin.elapsed())).ok();
+            let count = std::iter::from_fn(heard).take(200).count();
+            hub.end();
+            assert_eq!(count, 200, "heard at once");
+        });
     }
 }

@@ -147,6 +147,36 @@ fn messages_that_are_long_wrong_or_too_many_end_their_own_connection() {
     assert_alive(&server, &token);
 }
 
+// Check that neither many fragments at once nor one byte after the other keeps a connection.
+#[test]
+fn fragments_without_an_end_keep_nobody_out() {
+    const FIRST: [u8; 6] = [0x01, 0x80, 0, 0, 0, 0];
+    const NEXT: [u8; 6] = [0x00, 0x80, 0, 0, 0, 0];
+    let (server, token) = server();
+    let address = server.address();
+    let origin = format!("http://{address}");
+    // Fifteen that do not know the token, and one that does.
+    let mut sockets: Vec<_> = (0..15).map(|_| open(address, Some(&origin)).unwrap()).collect();
+    sockets.insert(0, enter(&server, &token));
+    let begin = Instant::now();
+    std::thread::scope(|scope| {
+        for (number, socket) in sockets.iter().enumerate() {
+            let mut pieces = FIRST.into_iter().chain(NEXT.into_iter().cycle());
+            let (size, pause) =
+                if number % 2 == 0 { (NEXT.len() << 7, Duration::ZERO) } else { (1, Duration::from_millis(2)) };
+            scope.spawn(move || {
+                while socket.get_ref().write_all(&pieces.by_ref().take(size).collect::<Vec<_>>()).is_ok() {
+                    assert!(begin.elapsed() < Duration::from_secs(10), "connection {number} stays");
+                    std::thread::sleep(pause);
+                }
+            });
+        }
+    });
+    let page = ask(address, &format!("GET / HTTP/1.1\r\nHost: {address}"));
+    assert!(page.starts_with("HTTP/1.1 200 "), "{page}");
+    assert_alive(&server, &token);
+}
+
 #[test]
 fn no_number_that_is_none_moves_the_tool() {
     let (server, token) = server();
