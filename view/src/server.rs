@@ -154,9 +154,10 @@ impl Server {
 
     fn end(&mut self) -> Option<Summary> {
         self.hub.end();
-        // A knock at the own door: whoever waits there sees that it is over.
-        drop(TcpStream::connect_timeout(&self.shown_address(), Duration::from_secs(1)));
-        if let Some(accepting) = self.accepting.take() {
+        // A knock at the own door: whoever waits there sees that it is over. Where the address has gone from this machine nobody hears
+        // it, and nobody is waited for.
+        let knocked = TcpStream::connect_timeout(&self.shown_address(), Duration::from_secs(1));
+        if let Some(accepting) = self.accepting.take().filter(|_| knocked.is_ok()) {
             let _ = accepting.join();
         }
         self.stage.take().and_then(|stage| stage.join().ok().flatten())
@@ -258,5 +259,23 @@ fn give_log(stream: &mut TcpStream, hub: &Hub) {
             let _ = http::answer(stream, &answer);
         }
         _ => drop(http::answer(stream, &Answer::refusal("404 Not Found", "nothing was recorded\n"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::guard::Token;
+
+    #[test]
+    fn a_server_whose_address_has_gone_ends_all_the_same() {
+        let mut door = Door::open(&Options::default()).unwrap();
+        let gone = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        door.address = gone;
+        let hub = Arc::new(Hub::new(Token::new().unwrap(), std::sync::mpsc::channel().0));
+        let server = Server::start(door, hub, || None).unwrap();
+        let (tell, told) = std::sync::mpsc::channel();
+        std::thread::spawn(move || tell.send(server.stop().is_none()));
+        assert_eq!(told.recv_timeout(Duration::from_secs(3)), Ok(true), "it does not end");
     }
 }
