@@ -213,6 +213,8 @@ impl Playback {
     /// The tools at `time` beside the surface of another.
     fn tools(&self, time: Nanos, frame: &Frame) -> Bytes {
         let mut touches = Vec::new();
+        // Between two ticks the contact of the first goes on.
+        let recent = Nanos((2e9 / self.environment.haptic_hz).clamp(2e6, 1e8) as u64);
         let tools: Vec<ToolView> = self
             .tracks
             .values()
@@ -223,7 +225,7 @@ impl Playback {
                 let contact = before(track.contacts.partition_point(|contact| contact.time <= time));
                 let contact = contact.map(|at| track.contacts[at]);
                 let (tool, (_, row)) = (tool.unwrap_or_default(), row.unwrap_or_default());
-                let is_now = |then: Nanos| time.saturating_sub(then) < Nanos(2_000_000);
+                let is_now = |then: Nanos| time.saturating_sub(then) < recent;
                 if let Some(tick) = before(track.touches.partition_point(|touch| touch.0 <= time)) {
                     let then = track.touches[tick].0;
                     let own = track.touches[..=tick].iter().rev().take_while(|touch| is_now(then) && touch.0 == then);
