@@ -225,6 +225,25 @@ def newtons(text):
     return float(value) * {"N": 1, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9, "kN": 1e3}[unit]
 
 
+PIXELS = """(() => {
+  const [width, height] = [300, 200];
+  const flat = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
+  flat.drawImage(document.getElementById("picture"), 0, 0, width, height);
+  const { data } = flat.getImageData(0, 0, width, height);
+  return Array.from({ length: width * height }, (_, n) => 4 * n).filter((at) => [0, 1, 2].some((n) => data[at + n] !== data[n])).length;
+})()"""
+
+
+def lost_picture(check, browser):
+    """What the graphics card loses is drawn again."""
+    before = browser.run(PIXELS)
+    check.that(before > 500, f"{before} pixels of the picture are not the stage's")
+    browser.run("(window.card = document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context')).loseContext()")
+    wait(browser, lambda state: "lost the picture" in state["note"], "words about the picture")
+    browser.run("window.card.restoreContext()")
+    wait(browser, lambda state: state["note"] == "" and browser.run(PIXELS) > 0.8 * before, "the picture again")
+
+
 def changes(check, browser, shots):
     """Stiffness, friction and model change under the tool, and the body goes on."""
     before = wait(browser, lambda state: newtons(state["computed"]) > 0.3, "a force")
@@ -423,6 +442,7 @@ def check_live(check, browser, palpate, log, shots):
         browser.run("document.getElementById('reset').click()")
         wait(browser, lambda state: state["time"] < before, "a reset")
         found = complaints(browser, view.url.split("#")[0])
+        lost_picture(check, browser)
         leave(browser)
     finally:
         view.stop()

@@ -88,6 +88,7 @@ function frame(now) {
 
 nameLines();
 if (startPainter(element("picture"))) {
+  keepPainting(element("picture"));
   startPointer(element("picture"));
   startKeys(element("picture"));
   startPanel();

@@ -103,6 +103,12 @@ function startPainter(canvas) {
   return true;
 }
 
+// A graphics card that is reset, or a phone that needs its memory, takes all that was handed to it; it is asked for again and handed over anew.
+function keepPainting(canvas) {
+  canvas.addEventListener("webglcontextlost", (event) => { event.preventDefault(); say("The browser has lost the picture; it comes back when the browser can draw again."); });
+  canvas.addEventListener("webglcontextrestored", () => { startPainter(canvas); state.isNew.topology = true; say(""); });
+}
+
 // Hands the newest surface to the graphics card, if there is a newer one.
 function uploadSurface() {
   const { gl, buffers } = painter;
