@@ -593,12 +593,64 @@ def check_linked(check, browser, palpate, log, shots):
     check.faults += [f"linked: {complaint}" for complaint in found]
 
 
-def check_log(check, browser, palpate, log, shots):
-    forces = commanded(palpate, log)
-    view = View(palpate, str(log))
+TIMING = "['n-lateness', 'n-execution'].map((id) => document.getElementById(id).textContent)"
+
+
+def copy(name, folder, instead):
+    """A scene of this repository with some words in place of others, elsewhere."""
+    text = Path("scenes", name).read_text()
+    for old, new in instead.items():
+        text = text.replace(old, new)
+    text = text.replace('path_csv = "', f'path_csv = "{Path("scenes").resolve()}/')
+    (folder / name).write_text(text)
+    return str(folder / name)
+
+
+def check_second_tool(check, browser, palpate, folder, port):
+    """The tool that is shown first is the one that can be pushed; gives what is said of the session's timing in the end."""
+    scene = copy("two_hands.toml", folder, {'kind = "hand"\npath_csv = "paths/hold_right.csv"': 'kind = "pointer"'})
+    view = View(palpate, scene, "--watch", "--port", port)
     try:
         start(browser, view)
+        first = wait(browser, lambda state: state["tool"] and state["frames"] > 5, "the first picture of a second tool")
+        check.that("you hold the tool" in first["status"], f"nobody holds the second tool: {first['status']}")
+        browser.run("document.getElementById('picture').focus()")
+        for _ in range(6):
+            key(browser, "ArrowUp")
+        wait(browser, lambda state: state["tool"][1] < first["tool"][1] - 4, "a push of the second tool")
+        wait(browser, lambda _: "–" not in browser.run(TIMING), "the timing of a session")
+    finally:
+        view.stop()
+    return browser.run(TIMING)
+
+
+def check_fast_log(check, browser, palpate, folder):
+    """Strips show all of their seconds, however many ticks a second has."""
+    scene, log = copy("drag_friction.toml", folder, {"rate_hz = 1000": "rate_hz = 4000"}), str(folder / "fast.mcap")
+    subprocess.run([palpate, "run", scene, "--virtual", "--model", "hold", "--log-scene", "--out", log], stdout=subprocess.DEVNULL, check=True)
+    view = View(palpate, log)
+    try:
+        start(browser, view)
+        wait(browser, lambda state: "4000 Hz" in state["status"], "the fast log")
+        browser.run("(() => { const s = document.getElementById('scrub'); s.value = 2.4; s.dispatchEvent(new Event('input')); })()")
+        ticks = "JSON.parse(document.getElementById('strip-force').dataset.shown ?? '{}').ticks"
+        wait(browser, lambda _: (browser.run(ticks) or 0) > 9500, "a strip of all ticks")
+        leave(browser)
+    finally:
+        view.stop()
+
+
+def check_log(check, browser, palpate, folder, log, shots):
+    forces = commanded(palpate, log)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+    # A session before it in the same tab leaves nothing behind.
+    before = check_second_tool(check, browser, palpate, folder, port)
+    view = View(palpate, str(log), "--port", port)
+    try:
+        browser.run(f"location.hash = '{view.url.partition('#')[2]}'")
         wait(browser, lambda state: "a log" in state["status"] and state["frames"] > 3, "the log")
+        browser.events.clear()
         last = max(forces) / 1e6
         seen = []
         for share in (0.9, 0.5, 0.7, 0.95, 0.8):
@@ -608,6 +660,7 @@ def check_log(check, browser, palpate, log, shots):
             check.that(abs(state["time"] - at) < 0.011, f"at {at} s the page says {state['time']}")
             seen.append(state["tick"])
         check_forces(check, seen, forces, "log")
+        check.that(browser.run(TIMING) != before, f"the timing of the session before is that of the log: {before}")
         before = float(browser.run(STATE)["scrub"])
         browser.run("document.getElementById('back').click()")
         stepped = wait(browser, lambda state: float(state["scrub"]) < before, "a step back")
@@ -617,6 +670,7 @@ def check_log(check, browser, palpate, log, shots):
         browser.run("document.getElementById('play').click()")
         layouts(check, browser, shots, "log")
         check.faults += [f"log: {complaint}" for complaint in complaints(browser, view.url.split("#")[0])]
+        leave(browser)
     finally:
         view.stop()
 
@@ -640,7 +694,8 @@ def main():
             check_live(check, browser, args.palpate, log, args.shots)
             check_two_tools(check, browser, args.palpate, args.shots)
             check_return(check, browser, args.palpate, args.shots)
-            check_log(check, browser, args.palpate, log, args.shots)
+            check_log(check, browser, args.palpate, args.folder, log, args.shots)
+            check_fast_log(check, browser, args.palpate, args.folder)
             check_opening(check, args.palpate, args.folder)
     finally:
         with contextlib.suppress(RuntimeError):

@@ -108,7 +108,7 @@ function composed() {
 
 function startPanel() {
   element("controls").addEventListener("submit", (event) => event.preventDefault());
-  element("device").addEventListener("change", (event) => { state.device = Number(event.target.value); hand.target = null; });
+  element("device").addEventListener("change", (event) => { Object.assign(state, { device: Number(event.target.value), isChosen: true }); hand.target = null; });
   element("colour").addEventListener("change", (event) => colourBy(event.target.value));
   element("model").addEventListener("change", (event) => send({ do: "change", model: event.target.value }));
   const sliders = {

@@ -16,6 +16,7 @@ const state = {
   tools: [], // as they are drawn: position, orientation, computed, commanded, pointer, mode
   touches: [], // place, force, triangle, device
   device: 0, // whose numbers and strips are shown, and which tool a drag moves
+  isChosen: false, // by the visitor
   colourBy: "depth",
   deepest: 0, // m
   deepestPlace: null,

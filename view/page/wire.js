@@ -97,8 +97,10 @@ function hear(message) {
     Object.assign(wire, { key: message.key, wait: LEAST_WAIT });
     away("");
     hand.target = null;
-    state.device = Math.min(state.device, Math.max(0, message.tools.length - 1));
-    rings.forEach((ring) => ring.clear());
+    // Until a visitor chooses one: the tool that can be pushed.
+    state.device = state.isChosen ? Math.min(state.device, Math.max(0, message.tools.length - 1)) : Math.max(0, message.tools.findIndex((tool) => tool.pointer));
+    state.stats = null;
+    rings.clear();
     forgetTimeline();
     changes.length = 0;
     Object.assign(colouring.top, COLOUR_TOPS);
@@ -115,7 +117,7 @@ function hear(message) {
   } else if (message.kind === "note") {
     say(message.text);
   } else if (message.kind === "clear") {
-    rings.forEach((ring) => ring.clear());
+    rings.clear();
   } else if (message.kind === "stats") {
     state.stats = message;
     if (message.ended) say("The session has ended. Reset starts another one, where that can be.");
