@@ -155,6 +155,12 @@ def wait(browser, holds, what):
         time.sleep(0.05)
 
 
+def soon(browser):
+    """The state two pictures later: all that was done before is in it."""
+    frames = browser.run(STATE)["frames"]
+    return wait(browser, lambda state: state["frames"] > frames + 1, "two pictures")
+
+
 def mouse(browser, kind, x, y, **more):
     pressed = kind != "mouseReleased"
     browser.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=int(pressed), clickCount=1, **more)
@@ -370,6 +376,12 @@ def touch(check, browser):
         key(browser, name)
         after = wait(browser, lambda state: state["distance"] != before, name)["distance"]
         check.that((after < before) == nearer, f"{name} moves the tool from {before} m to {after} m from the viewer")
+    # At the end of its room the pointer does not go on where the tool does not follow.
+    ways = []
+    for _ in range(3):
+        ways.append(soon(browser)["distance"])
+        browser.run("for (let n = 0; n < 100; n += 1) document.getElementById('picture').dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight', shiftKey: true }))")
+    check.that(ways[0] != ways[1] == ways[2], f"half a metre after the other to the right the pointer is {ways} m away")
     key(browser, "h")
     wait(browser, lambda state: state["contact"] == "free" and state["deepest_mm"] < 0.5, "the way home")
     size(browser, 1280, "light")

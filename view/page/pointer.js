@@ -11,7 +11,9 @@ function wantedPlace() {
 
 function want(place) {
   if (!canPush() || !place.every(Number.isFinite)) return;
-  hand.target = place;
+  // No farther than the server lets it, so that the way back begins at once.
+  const [low, high] = state.hello.bounds;
+  hand.target = place.map((c, axis) => Math.max(low[axis], Math.min(high[axis], c)));
 }
 
 // Once per picture, the newest place.

@@ -140,6 +140,7 @@ impl Live {
             "has_samples": self.records.is_some(),
             "has_stress": self.viewer.as_ref().is_some_and(Viewer::knows_stress),
             "settings": self.settings(),
+            "bounds": bounds,
             "tools": (0..tools).map(|device| json!({
                 "name": self.environment.devices.get(device),
                 "shape": shape(self.environment.shape(device as u16)),

@@ -35,6 +35,17 @@ fn the_tool_goes_where_the_pointer_is_and_a_new_session_keeps_the_pointer() {
 }
 
 #[test]
+fn a_page_is_told_how_far_its_pointer_may_go() {
+    let (server, token) = server();
+    let mut visitor = enter(&server, &token);
+    let hello = find(&mut visitor, hello).unwrap();
+    let bound = |corner: usize, axis: usize| hello["bounds"][corner][axis].as_f64().unwrap() as f32;
+    say(&mut visitor, r#"{"do":"move","device":0,"to":[900,-900,900]}"#);
+    let far = [bound(1, 0), bound(0, 1), bound(1, 2)];
+    assert!(find(&mut visitor, |message| tool(message).filter(|tool| tool.2 == far)).is_some());
+}
+
+#[test]
 fn friction_stiffness_and_model_change_while_the_body_goes_on() {
     let (server, token) = server();
     let mut visitor = enter(&server, &token);
