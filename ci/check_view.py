@@ -258,6 +258,7 @@ def changes(check, browser, shots):
     # The pointer's spring gives way: the force grows by less than the stiffness.
     stiffer = wait(browser, lambda state: newtons(state["computed"]) > 1.08 * newtons(before["computed"]), "a stiffer body")
     check.that(stiffer["time"] > before["time"], "the body started anew")
+    wait(browser, lambda _: "the most" in browser.run("document.getElementById('stiffness-value').textContent"), "the most that its steps bear")
     choose(browser, "stiffness", 0)
     wait(browser, lambda state: newtons(state["computed"]) < 1.05 * newtons(before["computed"]), "the body as it was")
     for model in ("full", "hold", "predictive", "patch"):
@@ -268,6 +269,9 @@ def changes(check, browser, shots):
     choose(browser, "friction", 0.1)
     wait(browser, lambda state: state["friction"] == "0.10", "another friction")
     shoot(browser, shots, "changes-1280-light")
+    # What is set may lie between two steps of its slider.
+    browser.run("(() => { const e = document.getElementById('friction'); e.step = 'any'; e.value = 0.33; e.dispatchEvent(new Event('change')); e.step = 0.05; })()")
+    wait(browser, lambda state: state["friction"] == "0.33", "a friction between two steps")
     choose(browser, "friction", 0.5)
     choose(browser, "colour", "stress")
     shown = wait(browser, lambda state: (state["stress"] or 0) > 0, "the stress")

@@ -58,16 +58,31 @@ function showSettings() {
 
 const panel = { moving: new Set() };
 
+// What is set, which may lie between the steps of a slider or beyond its end; of one that is moved just now, what it says.
 function showValues() {
-  const settings = state.hello?.settings;
-  const coefficient = (id, value) => { element(`${id}-value`).textContent = value === null ? "sticks" : Number(element(id).value).toFixed(2); };
-  coefficient("friction", settings.friction);
-  coefficient("static", settings.static_friction);
-  element("stribeck-value").textContent = withUnit(Number(element("stribeck").value), "m/s", 2);
-  const stiffness = element("stiffness");
-  const isMost = Number(stiffness.value) >= Number(stiffness.max) - 1e-9 && Number(stiffness.max) < 1;
-  element("stiffness-value").textContent = `× ${(10 ** stiffness.value).toFixed(2)}${isMost ? ", the most its steps bear" : ""}`;
+  const { settings } = state.hello;
+  const shown = (id, value) => (panel.moving.has(id) ? sliders[id].value(Number(element(id).value)) : value);
+  const put = (id, value, text) => { element(`${id}-value`).textContent = value === null ? "sticks" : text(value); };
+  const coefficient = (value) => value.toFixed(2);
+  put("friction", shown("friction", settings.friction), coefficient);
+  put("static", shown("static", settings.static_friction), coefficient);
+  put("stribeck", shown("stribeck", settings.stribeck_m_s), (value) => withUnit(value, "m/s", 2));
+  const most = settings.stiffness_limits[1];
+  put("stiffness", shown("stiffness", settings.stiffness), (value) => `× ${value.toFixed(2)}${value >= most && most < 10 ? ", the most its steps bear" : ""}`);
 }
+
+// What each slider sets, and the value that it means.
+const same = (value) => value;
+const sliders = {
+  friction: { field: "friction", value: same },
+  static: { field: "static_friction", value: same },
+  stribeck: { field: "stribeck_m_s", value: same },
+  // The limit is on no step: the last one before it stands for it.
+  stiffness: { field: "stiffness", value: (place) => {
+    const { step, max } = element("stiffness");
+    return place > max - step ? Math.min(10, state.hello.settings.stiffness_limits[1]) : 10 ** place;
+  } },
+};
 
 function colourBy(name) {
   element("colour").value = name;
@@ -111,17 +126,10 @@ function startPanel() {
   element("device").addEventListener("change", (event) => { Object.assign(state, { device: Number(event.target.value), isChosen: true }); hand.target = null; });
   element("colour").addEventListener("change", (event) => colourBy(event.target.value));
   element("model").addEventListener("change", (event) => send({ do: "change", model: event.target.value }));
-  const sliders = {
-    friction: (value) => ({ friction: value }),
-    static: (value) => ({ static_friction: value }),
-    stribeck: (value) => ({ stribeck_m_s: value }),
-    // Not above the limit by rounding.
-    stiffness: (value) => ({ stiffness: Math.min(10 ** value, state.hello.settings.stiffness_limits[1]) }),
-  };
-  for (const [id, change] of Object.entries(sliders)) {
+  for (const [id, { field, value }] of Object.entries(sliders)) {
     // While it is moved, ten times a second at most: it is felt at once.
     let last = 0;
-    const tell = () => { last = performance.now(); send({ do: "change", ...change(Number(element(id).value)) }); };
+    const tell = () => { last = performance.now(); send({ do: "change", [field]: value(Number(element(id).value)) }); };
     element(id).addEventListener("input", () => { panel.moving.add(id); showValues(); if (performance.now() - last > 100) tell(); });
     element(id).addEventListener("change", () => { panel.moving.delete(id); tell(); });
   }
