@@ -372,8 +372,19 @@ def touch(check, browser):
     for step in range(1, 6):
         send("touchMove", point(x, y - 64), point(x + 40 + 10 * step, y - 64, 1))
         time.sleep(0.05)
+    pinched = soon(browser)["distance"]
+    check.that(pinched > before, "fingers that part do not push the tool away")
+    # What two fingers do while there is a third is nothing, then and when it has gone.
+    browser.run("document.getElementById('picture').addEventListener('pointerdown', (event) => { window.third = event.pointerId; }, { once: true })")
+    three = lambda way: (point(x, y - 64), point(x + 90 + way, y - 64, 1), point(x + 45, y - 20, 2))
+    send("touchStart", *three(0))
+    send("touchMove", *three(60))
+    soon(browser)
+    browser.run("document.getElementById('picture').dispatchEvent(new PointerEvent('pointerup', { pointerId: window.third }))")
+    send("touchMove", *three(61))
+    after = soon(browser)["distance"]
+    check.that(0 < after - pinched < 3e-3, f"a third finger moves the tool from {pinched} m to {after} m from the viewer")
     send("touchEnd")
-    check.that(wait(browser, lambda state: state["distance"] != before, "a pinch")["distance"] > before, "fingers that part do not push the tool away")
     browser.run("document.getElementById('picture').focus()")
     for name, nearer in (("PageUp", True), ("PageDown", False)):
         before = browser.run(STATE)["distance"]

@@ -63,6 +63,7 @@ function startPointer(canvas) {
     hand.pointers.set(event.pointerId, now);
     const [dx, dy] = [now[0] - before[0], now[1] - before[1]];
     const height = canvas.clientHeight;
+    if (hand.pointers.size > 2) return;
     if (hand.pointers.size === 2) {
       const wide = spread();
       // Fingers that part come nearer: of a grabbed tool it goes in.
@@ -81,6 +82,7 @@ function startPointer(canvas) {
   });
   const end = (event) => {
     hand.pointers.delete(event.pointerId);
+    if (hand.pointers.size === 2) hand.pinch = spread();
     if (hand.pointers.size === 0) { hand.grabs = false; canvas.classList.remove("grabbing"); }
   };
   ["pointerup", "pointercancel", "lostpointercapture"].forEach((name) => canvas.addEventListener(name, end));
