@@ -1,6 +1,6 @@
 
 // The ticks of the last seconds, a ring for each device. A row has the time and these numbers.
-const COLUMNS = ["fx", "fy", "fz", "cx", "cy", "cz", "lateness", "execution", "age", "energy", "ledger", "pressure", "jump", "limits", "resync"];
+const COLUMNS = ["fx", "fy", "fz", "cx", "cy", "cz", "lateness", "execution", "age", "energy", "ledger", "pressure", "limits", "resync"];
 const ROW = COLUMNS.length + 1;
 // Of what a strip shows, with room for a block (s).
 const KEPT_S = 4.2;

@@ -7,7 +7,7 @@ const MOST_WAIT = 8000;
 const MOST_QUIET = 8;
 // It does not know the token: there is no use in coming again.
 const REFUSED = 1008;
-const wire = { socket: null, key: null, wait: LEAST_WAIT, timer: 0, quiet: 0, isRefused: false, bytes: 0 };
+const wire = { socket: null, key: null, wait: LEAST_WAIT, timer: 0, quiet: 0, isRefused: false };
 const TOOL = 17;
 const CONTACT = 8;
 
@@ -125,7 +125,6 @@ function hear(message) {
 }
 
 function see(buffer) {
-  wire.bytes += buffer.byteLength;
   const head = new DataView(buffer);
   const u32 = (at) => head.getUint32(at, true);
   const f64 = (at) => head.getFloat64(at, true);

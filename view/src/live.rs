@@ -132,7 +132,6 @@ impl Live {
             "mode": "live",
             "model": self.environment.model,
             "body": self.environment.body,
-            "why": self.environment.model_reason.as_ref().map(|reason| &reason.why),
             "warning": self.environment.model_reason.as_ref().and_then(|reason| reason.warning.as_ref()),
             "haptic_hz": self.environment.haptic_hz,
             "global_hz": self.environment.global_hz,
@@ -239,7 +238,7 @@ impl Live {
         }
     }
 
-    /// Counts and percentiles of every group, and what the server itself has sent.
+    /// Counts and percentiles of every group.
     fn tell(&self, hub: &Hub) {
         let us = |time: Nanos| 1e-3 * time.0 as f64;
         let groups: Vec<Value> = self
@@ -260,10 +259,8 @@ impl Live {
                 })
             })
             .collect();
-        let (browsers, bytes, dropped) = hub.traffic();
-        let sent = json!({ "browsers": browsers, "bytes": bytes, "dropped": dropped });
         let ended = self.running.finished();
-        hub.say(&json!({ "kind": "stats", "groups": groups, "sent": sent, "ended": ended }));
+        hub.say(&json!({ "kind": "stats", "groups": groups, "ended": ended }));
     }
 }
 

@@ -28,8 +28,6 @@ pub(crate) struct Row {
     pub(crate) ledger_mj: f64,
     /// Normal force over area (kPa); zero for a point.
     pub(crate) pressure_kpa: f64,
-    /// Difference of the new and the old model's force at a resync (mN); zero in other ticks.
-    pub(crate) jump_mn: f64,
     /// True in the tick of a resync.
     pub(crate) is_resync: bool,
     /// Safety stages that acted: a bit each.
@@ -66,8 +64,7 @@ impl Rows {
                 self.row(sample.device, time).pressure_kpa = 1e-3 * f64::from(sample.mean_pressure_pa());
             }
             LogRecord::Resync(resync) => {
-                let row = self.row(resync.device, time);
-                (row.jump_mn, row.is_resync) = (1e3 * resync.jump_before_n, true);
+                self.row(resync.device, time).is_resync = true;
             }
             LogRecord::Tick(timing) if timing.group == 0 => {
                 let us = |from: Nanos, to: Nanos| 1e-3 * to.saturating_sub(from).0 as f64;
@@ -126,11 +123,11 @@ pub(crate) fn block(device: u16, deadline: Nanos, rows: &[(Nanos, Row)]) -> Byte
 
 impl Row {
     /// Milliseconds since the first row, and the numbers.
-    pub(crate) const FLOATS: usize = 16;
+    pub(crate) const FLOATS: usize = 15;
 
     fn numbers(&self) -> [f64; Self::FLOATS - 1] {
         let ([fx, fy, fz], [cx, cy, cz]) = (self.force_n, self.command_n);
-        let Self { lateness_us, execution_us, age_ms, energy_mj, ledger_mj, pressure_kpa, jump_mn, limits, .. } = *self;
+        let Self { lateness_us, execution_us, age_ms, energy_mj, ledger_mj, pressure_kpa, limits, .. } = *self;
         [
             fx,
             fy,
@@ -144,7 +141,6 @@ impl Row {
             energy_mj,
             ledger_mj,
             pressure_kpa,
-            jump_mn,
             f64::from(limits),
             f64::from(u8::from(self.is_resync)),
         ]

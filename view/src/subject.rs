@@ -40,8 +40,6 @@ pub struct Pushed {
     out: Option<PathBuf>,
     open_haply: Option<OpenHaply>,
     connect: Option<Connect>,
-    /// The number of the device that is pushed.
-    device: usize,
     /// Sessions so far.
     count: u32,
 }
@@ -62,12 +60,12 @@ impl Pushed {
         if let Some(pushed) = scene.devices.get_mut(device) {
             point(pushed);
         }
-        Self { device, ..Self::as_it_is(scene) }
+        Self::as_it_is(scene)
     }
 
     /// A scene with its own devices, to be watched.
     pub fn as_it_is(scene: Scene) -> Self {
-        Self { scene, out: None, open_haply: None, connect: None, device: 0, count: 0 }
+        Self { scene, out: None, open_haply: None, connect: None, count: 0 }
     }
 
     /// Also writes a log of each session, with pictures: the first to `path`, each after it to a name with its number.
@@ -129,12 +127,9 @@ impl Pushed {
         let asked = change.model.as_deref().unwrap_or(self.scene.local.model.name());
         // The other side of a link has the scene's alone.
         let models = if self.connect.is_some() { vec![asked] } else { ModelChoice::NAMES.to_vec() };
-        let spring = self.scene.devices.get(self.device).filter(|device| device.kind == DeviceKind::Pointer);
         json!({
             "can_restart": true,
             "models": models,
-            "asked_model": asked,
-            "spring_n_per_m": spring.map(|device| device.pointer.stiffness_n_per_m),
             "session": self.count,
         })
     }
@@ -221,7 +216,6 @@ mod tests {
         let pushed = Pushed::by_device(scene.clone(), "right");
         assert_eq!(kinds(&pushed)[1], DeviceKind::Pointer);
         assert_eq!(kinds(&pushed)[0], scene.devices[0].kind);
-        assert!(pushed.about(&Change::default())["spring_n_per_m"].is_number());
         assert_eq!(kinds(&Pushed::new(scene))[0], DeviceKind::Pointer);
     }
 
