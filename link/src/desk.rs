@@ -86,6 +86,8 @@ struct State {
     arrivals: VecDeque<Arrival>,
     /// There is a session to start.
     is_ready: bool,
+    /// The session of those that are seated is being started, which takes a while where its bases are made first.
+    is_beginning: bool,
 }
 
 /// A haptic machine that has come.
@@ -162,7 +164,7 @@ impl Desk {
                     return Answer::No(why.clone());
                 }
                 if guest.is_seated {
-                    return Answer::Welcome(self.peer);
+                    return if state.is_beginning { Answer::Wait } else { Answer::Welcome(self.peer) };
                 }
             }
             None => {
@@ -215,9 +217,10 @@ impl Desk {
         }
         state.guests.retain(Guest::is_present);
         state.guests.iter_mut().for_each(|guest| guest.is_seated = true);
+        state.is_beginning = true;
         state.arrivals.push_back(Arrival::All(state.guests.clone()));
         self.changed.notify_all();
-        Answer::Welcome(self.peer)
+        Answer::Wait
     }
 
     /// A device in words.
@@ -234,6 +237,11 @@ impl Desk {
         state.unwrap_or_else(PoisonError::into_inner).0.arrivals.pop_front()
     }
 
+    /// The session that was to begin has begun: its machines are welcome.
+    pub(crate) fn has_begun(&self) {
+        self.state().is_beginning = false;
+    }
+
     /// There is a session to start again.
     pub(crate) fn is_ready(&self) {
         self.state().is_ready = true;
@@ -242,7 +250,9 @@ impl Desk {
     /// There is nothing for the machines of the session that was to begin, and why; if they come again under another number it may be
     /// different.
     pub(crate) fn refuse(&self, why: &str) {
-        self.state().guests.iter_mut().for_each(|guest| guest.refused = Some(why.to_owned()));
+        let mut state = self.state();
+        state.is_beginning = false;
+        state.guests.iter_mut().for_each(|guest| guest.refused = Some(why.to_owned()));
     }
 
     /// Forgets all machines: with those that are still there it is begun anew.
@@ -306,18 +316,21 @@ mod tests {
         let hello = |machine, session| said(&Hello { machine, session, ..lone() });
         let welcome = Answer::Welcome(desk.peer);
         assert_eq!(desk.answer(&[]), Answer::Wait);
-        assert_eq!(desk.answer(&hello(1, 10)), welcome);
-        assert_eq!(desk.answer(&hello(1, 10)), welcome, "as often as it asks");
+        assert_eq!(desk.answer(&hello(1, 10)), Answer::Wait, "until its session has begun");
+        desk.has_begun();
+        assert_eq!([(); 2].map(|()| desk.answer(&hello(1, 10))), [welcome.clone(), welcome], "as often as it asks");
         assert_eq!(desk.answer(&hello(2, 20)), Answer::Taken("the device".to_owned()));
         assert_eq!(desk.answer(&hello(1, 11)), Answer::Wait, "until another session is ready");
         assert_eq!(all(desk.wait_for_guests(Duration::ZERO)), [10]);
         assert!(desk.wait_for_guests(Duration::ZERO).is_none());
         desk.is_ready();
-        assert_eq!(desk.answer(&hello(1, 11)), welcome);
+        assert_eq!(desk.answer(&hello(1, 11)), Answer::Wait);
+        assert_eq!(all(desk.wait_for_guests(Duration::ZERO)), [11]);
         desk.refuse("the tool is far away");
         assert_eq!(desk.answer(&hello(1, 11)), Answer::No("the tool is far away".to_owned()));
         desk.is_ready();
-        assert_eq!(desk.answer(&hello(2, 20)), welcome, "nobody works with it now");
+        assert_eq!(desk.answer(&hello(2, 20)), Answer::Wait, "nobody works with it now");
+        assert_eq!(all(desk.wait_for_guests(Duration::ZERO)), [20]);
         desk.forget();
         assert!(desk.is_alone());
     }
@@ -332,9 +345,11 @@ mod tests {
         assert_eq!(asks(1, 10, left), Answer::WaitFor("device \"right\"".to_owned()));
         assert_eq!(asks(3, 30, left), Answer::Taken("device \"left\"".to_owned()));
         assert_eq!(asks(3, 30, [true; 2]), Answer::Taken("device \"left\"".to_owned()));
-        assert_eq!(asks(2, 20, right), welcome);
-        assert_eq!([asks(1, 10, left), asks(2, 20, right)], [welcome.clone(), welcome]);
+        assert_eq!(asks(2, 20, right), Answer::Wait);
         assert_eq!(all(desk.wait_for_guests(Duration::ZERO)), [10, 20]);
+        assert_eq!([asks(1, 10, left), asks(2, 20, right)], [Answer::Wait, Answer::Wait], "it is not there yet");
+        desk.has_begun();
+        assert_eq!([asks(1, 10, left), asks(2, 20, right)], [welcome.clone(), welcome]);
         desk.is_ready();
         assert_eq!(asks(3, 30, right), Answer::Taken("device \"right\"".to_owned()));
     }
@@ -348,6 +363,7 @@ mod tests {
         asks(1, 10, left);
         asks(2, 20, right);
         assert_eq!(all(desk.wait_for_guests(Duration::ZERO)), [10, 20]);
+        desk.has_begun();
         desk.is_ready();
         assert_eq!(asks(2, 21, right), Answer::Welcome(desk.peer));
         let again = desk.wait_for_guests(Duration::ZERO);
@@ -355,7 +371,7 @@ mod tests {
         // It comes with both devices: what runs is over, once the other one is gone.
         assert_eq!(asks(2, 22, [true; 2]), Answer::Taken("device \"left\"".to_owned()));
         std::thread::sleep(GONE_AFTER + Duration::from_millis(100));
-        assert_eq!(asks(2, 22, [true; 2]), Answer::Welcome(desk.peer));
+        assert_eq!(asks(2, 22, [true; 2]), Answer::Wait);
         assert_eq!(all(desk.wait_for_guests(Duration::ZERO)), [22]);
     }
 

@@ -113,7 +113,9 @@ impl GlobalSide {
                 continue;
             }
             let looked = Instant::now();
-            while looked.elapsed() < LOOKS_FOR {
+            // Who is not welcome yet gets none.
+            let looks_for = if welcome.is_some() { LOOKS_FOR } else { LOOK };
+            while looked.elapsed() < looks_for {
                 let has_models = welcome.is_some() && inbox.models() > 0;
                 if has_models && (inbox.is_ready() || first.get_or_insert_with(Instant::now).elapsed() > FIRST_BASES) {
                     return connection.ok_or_else(|| self.error("broke off".to_owned()));

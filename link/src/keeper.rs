@@ -86,11 +86,13 @@ pub(crate) struct Keeper {
     opening: [Option<Receiver<OwnLine>>; LINES],
     /// When it was last looked which lines lack one.
     completed: Option<Instant>,
-    /// When another connection was opened and welcome, which gets as long as the first to say something.
+    /// When another connection was opened and answered, which gets as long as the first to say something.
     reopened: Option<Instant>,
     /// It is silent, and yet welcome.
     welcome_since: Option<Instant>,
     is_refused: bool,
+    /// It was told to wait while its session begins: who works for it is not known before it is welcome, even if something comes.
+    is_waiting: bool,
 }
 
 impl Keeper {
@@ -108,6 +110,7 @@ impl Keeper {
             reopened: None,
             welcome_since: None,
             is_refused: false,
+            is_waiting: false,
         }
     }
 
@@ -115,7 +118,7 @@ impl Keeper {
     pub(crate) fn keep(mut self) {
         while !self.shared.is_over_after(LOOK) {
             let silent_for = self.shared.silent_for();
-            if silent_for < ASKS_AFTER {
+            if silent_for < ASKS_AFTER && !self.is_waiting {
                 self.welcome_since = None;
                 self.complete();
                 continue;
@@ -186,6 +189,7 @@ impl Keeper {
     }
 
     fn take(&mut self, answer: Answer) {
+        self.is_waiting = answer == Answer::Wait;
         match answer {
             Answer::Welcome(peer) => {
                 self.is_refused = false;
@@ -222,9 +226,12 @@ impl Keeper {
         let old = self.shared.kept().connection.replace(connection);
         // Closing may wait for a peer that is not there.
         in_background("link closing", move || drop(old));
-        if let Some(Answer::Welcome(peer)) = say_first(&session, &self.hello) {
-            self.shared.kept().peer = peer;
+        if let Some(answer) = say_first(&session, &self.hello) {
             self.reopened = Some(Instant::now());
+            self.is_waiting = answer == Answer::Wait;
+            if let Answer::Welcome(peer) = answer {
+                self.shared.kept().peer = peer;
+            }
         }
     }
 

@@ -70,6 +70,7 @@ pub fn serve(
                 serving.take().into_iter().for_each(|serving| serving.end(&mut tell));
                 match Serving::begin(&zenoh, ready, &guests) {
                     Ok(begun) => {
+                        desk.has_begun();
                         serving = Some(begun);
                         tell(Event::Began(guests.into_iter().map(|guest| guest.hello).collect()));
                     }
