@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use super::super::messages::ToolTick;
 use super::machine::Machine;
 use super::passed_bases::{BasesPorts, PassedBases};
-use super::sent_bases::MOST_ON_THE_WAY;
 use super::{MOST_MESSAGES, REPEATED};
 use crate::actors::messages::SurfaceView;
 use crate::actors::tunable::Tunable;
@@ -159,14 +158,14 @@ impl GlobalBridge {
         Self { machines, models, bases, are_bases_due: true, tools, settings, surface, haptic, is_prompt: false }
     }
 
-    /// Sends the bases that the machines lack, with `most` on their way at a time, and passes on what they have.
-    fn send_bases(&mut self, ctx: &TickContext, most: usize) {
+    /// Sends the bases that the machines lack, and passes on what they have.
+    fn send_bases(&mut self, ctx: &TickContext) {
         let Self { machines, models, bases, are_bases_due, .. } = self;
         if let Some(bases) = bases {
             let are_told = bases.take(ctx);
             if std::mem::take(are_bases_due) || are_told {
                 for machine in machines.iter_mut() {
-                    machine.send_bases(models.get(), &bases.made, most, ctx.scheduled);
+                    machine.send_bases(models.get(), &bases.made, ctx.scheduled);
                 }
                 bases.pass(ctx, machines, are_told);
             }
@@ -214,7 +213,7 @@ impl GlobalBridge {
             return_ticks: haptic.last_release(RETURNS_IN).max(1),
             is_prompt: self.is_prompt,
         };
-        let Self { machines, tools, settings, are_bases_due, .. } = self;
+        let Self { machines, tools, settings, bases, are_bases_due, .. } = self;
         for machine in machines {
             if machine.is_another() {
                 *are_bases_due = true;
@@ -228,7 +227,11 @@ impl GlobalBridge {
                     }
                     Message::Wants { held, friction, stiffness, is_watched } => {
                         if machine.is_newest_said(header.number) {
+                            let is_first = machine.bases.are_unknown();
                             *are_bases_due |= machine.bases.arrived(held, ctx.scheduled);
+                            if is_first && let Some(bases) = bases {
+                                bases.take_back(ctx, machine);
+                            }
                             machine.tune(settings, (friction, stiffness));
                             machine.is_watched = is_watched;
                         }
@@ -288,14 +291,13 @@ impl Actor for GlobalBridge {
 
     fn start(&mut self, ctx: &TickContext) -> Result<(), ActorError> {
         self.send_models(ctx);
-        // There is time: the session has not begun.
-        self.send_bases(ctx, usize::MAX);
+        self.send_bases(ctx);
         Ok(())
     }
 
     fn tick(&mut self, ctx: &TickContext) -> Outcome {
         self.send_models(ctx);
-        self.send_bases(ctx, MOST_ON_THE_WAY);
+        self.send_bases(ctx);
         self.send_surface(ctx.scheduled);
         Outcome::Continue
     }
@@ -307,3 +309,7 @@ impl Actor for GlobalBridge {
         Outcome::Continue
     }
 }
+
+#[cfg(test)]
+#[path = "../tests/global_bridge.rs"]
+mod tests;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::numbering::Numbering;
 use super::post::Post;
-use super::sent_bases::SentBases;
+use super::sent_bases::{MOST_ON_THE_WAY, SentBases};
 use super::{FIRST_EPOCH, SILENCE};
 use crate::actors::settings::Settings;
 use crate::actors::tunable::Tunable;
@@ -93,8 +93,10 @@ impl Machine {
         Some((header, message))
     }
 
-    /// Sends what it lacks of the bases that were `made`, those first that local models of its tools need; `most` are on their way at a time.
-    pub(super) fn send_bases(&mut self, models: &LocalModels, made: &[Arc<Basis>], most: usize, now: Nanos) {
+    /// Sends what it lacks of the bases that were `made`, those first that local models of its tools need: few at a time, but all of them
+    /// while its session has not begun.
+    pub(super) fn send_bases(&mut self, models: &LocalModels, made: &[Arc<Basis>], now: Nanos) {
+        let most = if self.is_ready { MOST_ON_THE_WAY } else { usize::MAX };
         let serves_it = |parcel: &&Parcel| self.tools.iter().any(|&tool| models.hosts()[tool] == parcel.tool());
         self.bases.send(&mut self.post, models.parcels().filter(serves_it), made, most, now);
     }

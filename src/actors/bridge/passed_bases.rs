@@ -48,7 +48,7 @@ impl PassedBases {
 
     /// Passes on what none of the `machines` lacks by now, and all of it again if it is to be `told` again.
     pub(super) fn pass(&mut self, ctx: &TickContext, machines: &[Machine], told: bool) {
-        let Self { ports, made, passed } = self;
+        let Self { made, passed, .. } = self;
         let before = passed.len();
         for basis in made.iter() {
             let is_there = || {
@@ -60,8 +60,22 @@ impl PassedBases {
             }
         }
         if told || passed.len() > before {
-            ports.passed.buffer().clone_from(passed);
-            ports.passed.publish(ctx);
+            self.publish(ctx);
         }
+    }
+
+    /// Takes back what `machine` lacks, which says what it has for the first time: until the rest is there, models are to do without, or be of
+    /// other windows.
+    pub(super) fn take_back(&mut self, ctx: &TickContext, machine: &Machine) {
+        let before = self.passed.len();
+        self.passed.retain(|basis| machine.bases.has(key_of(basis.patch())));
+        if self.passed.len() < before {
+            self.publish(ctx);
+        }
+    }
+
+    fn publish(&mut self, ctx: &TickContext) {
+        self.ports.passed.buffer().clone_from(&self.passed);
+        self.ports.passed.publish(ctx);
     }
 }

@@ -62,6 +62,11 @@ impl SentBases {
         is_news
     }
 
+    /// True if the machine has not said yet what it has.
+    pub(super) fn are_unknown(&self) -> bool {
+        self.told.is_none()
+    }
+
     /// True if the machine has said that it has the basis of that name.
     pub(super) fn has(&self, key: u64) -> bool {
         self.held.contains(&key)

@@ -80,6 +80,14 @@ impl Bases {
         self.of.insert(basis.patch.clone(), basis);
     }
 
+    /// Keeps the bases that are to `stay`.
+    ///
+    /// # Real-time
+    /// Not real-time safe: frees memory.
+    pub fn retain(&mut self, mut stay: impl FnMut(&Basis) -> bool) {
+        self.of.retain(|_, basis| stay(basis));
+    }
+
     /// The number of bases.
     ///
     /// # Real-time
