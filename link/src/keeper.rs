@@ -26,7 +26,7 @@ const REACHED_WITHIN: Duration = Duration::from_millis(300);
 const THINKS_FOR: Duration = Duration::from_millis(100);
 /// Another connection is waited for so long before yet another one is tried.
 const OPENS_WITHIN: Duration = Duration::from_millis(1000);
-/// A session that is welcome and yet silent for so long begins anew, under another number.
+/// A session that is silent for so long, welcome or refused, begins anew, under another number.
 const RENEWS_AFTER: Duration = Duration::from_secs(5);
 /// Lines get connections of their own so long after each other: such as begin at one moment may pause at one moment, as TCP with BBR does for
 /// 0.2 s about every ten seconds after it began.
@@ -88,8 +88,8 @@ pub(crate) struct Keeper {
     completed: Option<Instant>,
     /// When another connection was opened and answered, which gets as long as the first to say something.
     reopened: Option<Instant>,
-    /// It is silent, and yet welcome.
-    welcome_since: Option<Instant>,
+    /// It is silent, and yet the global side has said that it is welcome, or refused.
+    answered_since: Option<Instant>,
     is_refused: bool,
     /// It was told to wait while its session begins: who works for it is not known before it is welcome, even if something comes.
     is_waiting: bool,
@@ -108,7 +108,7 @@ impl Keeper {
             opening,
             completed: None,
             reopened: None,
-            welcome_since: None,
+            answered_since: None,
             is_refused: false,
             is_waiting: false,
         }
@@ -119,7 +119,7 @@ impl Keeper {
         while !self.shared.is_over_after(LOOK) {
             let silent_for = self.shared.silent_for();
             if silent_for < ASKS_AFTER && !self.is_waiting {
-                self.welcome_since = None;
+                self.answered_since = None;
                 self.complete();
                 continue;
             }
@@ -136,7 +136,7 @@ impl Keeper {
             match session.and_then(|session| say(&session, &self.hello, within)) {
                 Some(answer) => self.take(answer),
                 None => {
-                    self.welcome_since = None;
+                    self.answered_since = None;
                     if may_be_broken {
                         self.reopen();
                     }
@@ -194,14 +194,9 @@ impl Keeper {
             Answer::Welcome(peer) => {
                 self.is_refused = false;
                 self.shared.kept().peer = peer;
-                let since = *self.welcome_since.get_or_insert_with(Instant::now);
-                if since.elapsed() > RENEWS_AFTER {
-                    self.hello.session = unique();
-                    self.welcome_since = None;
-                    self.reopen();
-                }
+                self.renew_if_late();
             }
-            Answer::Wait | Answer::WaitFor(_) | Answer::Taken(_) => self.welcome_since = None,
+            Answer::Wait | Answer::WaitFor(_) | Answer::Taken(_) => self.answered_since = None,
             Answer::No(why) => {
                 if !std::mem::replace(&mut self.is_refused, true) {
                     tracing::warn!(
@@ -209,7 +204,19 @@ impl Keeper {
                         palpate::printable(&why)
                     );
                 }
+                self.renew_if_late();
             }
+        }
+    }
+
+    /// Begins anew under another number if this one has been welcome or refused for long and got nothing: what was lost on its way here is not
+    /// sent again, and a number whose session could not begin stays refused, while the next one may be welcome.
+    fn renew_if_late(&mut self) {
+        let since = *self.answered_since.get_or_insert_with(Instant::now);
+        if since.elapsed() > RENEWS_AFTER {
+            self.hello.session = unique();
+            self.answered_since = None;
+            self.reopen();
         }
     }
 
@@ -251,4 +258,43 @@ fn opening<T: Send + 'static>(open: impl FnOnce() -> Result<T, Error> + Send + '
         }
     });
     opened
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+
+    use zenoh::Wait;
+
+    use super::*;
+    use crate::access::Access;
+    use crate::line::HELLO;
+
+    /// Check that a machine whose session could not begin asks under another number, under which it may be welcome.
+    #[test]
+    fn whoever_is_refused_for_long_begins_anew() {
+        let free = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let (address, access) = (format!("tcp/{free}"), Access::default());
+        let there = zenoh::open(access.listening(&address).unwrap()).wait().unwrap();
+        let answer = |query: zenoh::query::Query| {
+            let question = query.payload().map(|payload| payload.to_bytes()).unwrap_or_default();
+            let is_first = Hello::read(&question).unwrap().session == 1;
+            let said = if is_first { Answer::No("it is far away".to_owned()) } else { Answer::Welcome(7) };
+            query.reply(query.key_expr().clone(), said.write()).wait().unwrap();
+        };
+        let _queryable = there.declare_queryable(HELLO).callback(answer).wait().unwrap();
+        let (shared, config) = (Arc::<Shared>::default(), access.connecting(&address).unwrap());
+        let hello = Hello { session: 1, ..Hello::default() };
+        let mut keeper = Keeper::new(Arc::clone(&shared), config, Vec::new(), hello);
+        let connection = Connection::open(&keeper.config, 1, &shared.inbox).unwrap();
+        let ask = |keeper: &mut Keeper| {
+            let answer = say_first(connection.zenoh(), &keeper.hello).unwrap();
+            keeper.take(answer);
+            (keeper.hello.session == 1, shared.kept().peer)
+        };
+        assert_eq!(ask(&mut keeper), (true, 0));
+        keeper.answered_since = Instant::now().checked_sub(RENEWS_AFTER);
+        assert!(!ask(&mut keeper).0, "it asks under one number");
+        assert_eq!(ask(&mut keeper), (false, 7));
+    }
 }
