@@ -128,14 +128,15 @@ impl Machine {
         is_newest
     }
 
-    /// Sets friction and stiffness as the machine wants them, when it wants others than before. What cannot be is told once.
+    /// Sets friction and stiffness as the machine wants them, each when it wants another one than before. What cannot be is told once.
     pub(super) fn tune(&mut self, settings: &Tunable, wanted: (Friction, Stiffness)) {
-        if std::mem::replace(&mut self.wanted, wanted) == wanted {
-            return;
-        }
+        let before = std::mem::replace(&mut self.wanted, wanted);
         let (friction, stiffness) = wanted;
-        let set = [settings.set_friction(friction), settings.set_stiffness(stiffness.factor())];
-        for why in set.into_iter().filter_map(Result::err) {
+        let set = [
+            (friction != before.0).then(|| settings.set_friction(friction)),
+            (stiffness != before.1).then(|| settings.set_stiffness(stiffness.factor())),
+        ];
+        for why in set.into_iter().flatten().filter_map(Result::err) {
             if !std::mem::replace(&mut self.is_warned, true) {
                 tracing::warn!("the haptic side wants what cannot be: {why}; more like it is not told");
             }
@@ -189,10 +190,13 @@ mod tests {
         let [here, there] = VirtualLink::ends(Conditions::default());
         let mut machines =
             [(here, 0), (there, 1)].map(|(end, tool)| Machine::new(Box::new(end), vec![tool], false, &settings));
-        let mut says = |machine: usize, friction: f64| {
-            machines[machine].tune(&settings, (friction.into(), Stiffness::default()));
-            settings.value().friction.kinetic
+        let mut says = |machine: usize, friction: f64, factor: f64| {
+            machines[machine].tune(&settings, (friction.into(), Stiffness::times(factor).unwrap()));
+            let Settings { friction, stiffness, .. } = settings.value();
+            (friction.kinetic, stiffness.factor())
         };
-        assert_eq!([says(0, 0.2), says(1, 0.5), says(0, 0.2), says(1, 0.4), says(0, 0.2)], [0.2, 0.2, 0.2, 0.4, 0.4]);
+        let friction = [(0, 0.2), (1, 0.5), (0, 0.2), (1, 0.4), (0, 0.2)].map(|(one, mu)| says(one, mu, 1.0));
+        assert_eq!(friction, [0.2, 0.2, 0.2, 0.4, 0.4].map(|mu| (mu, 1.0)));
+        assert_eq!([says(0, 0.2, 1.5), says(1, 0.3, 1.0)], [(0.4, 1.5), (0.3, 1.5)], "the one setting, not the other");
     }
 }
