@@ -235,7 +235,7 @@ impl HapticBridge {
         });
     }
 
-    /// Takes what has come; the newest models of all.
+    /// Takes what has come; the newest models of all, of equally old ones before the first tick the last.
     fn receive(&mut self, ctx: &TickContext) {
         let now = ctx.scheduled;
         for _ in 0..MOST_MESSAGES {
@@ -246,8 +246,10 @@ impl HapticBridge {
                     // One that was overtaken is outdated; one of a tick that has not been is none, and would never be old.
                     let tick = shipment.tick();
                     let own = self.tools.iter().filter(|tool| tool.elsewhere.is_none());
-                    let has_been = own.map(Tool::newest).min().is_some_and(|sent| tick <= sent);
-                    if has_been && self.newest.is_none_or(|newest| tick > newest) {
+                    let sent = own.map(Tool::newest).min();
+                    // Before the first tick here, all are of tick 0, however much later the body is there that others touch.
+                    let is_newest = self.newest.is_none_or(|newest| tick > newest || sent == Some(0));
+                    if sent.is_some_and(|sent| tick <= sent) && is_newest {
                         self.newest = Some(tick);
                         self.arrived = Some(shipment);
                     }
@@ -336,3 +338,7 @@ impl Actor for HapticBridge {
         Outcome::Continue
     }
 }
+
+#[cfg(test)]
+#[path = "../tests/haptic_bridge.rs"]
+mod tests;
