@@ -80,8 +80,8 @@ pub(crate) struct Keeper {
     /// Where the global side may be reached, looked up while the network was there.
     places: Vec<SocketAddr>,
     hello: Hello,
-    /// An answer takes no longer if somebody is there.
-    reached_within: Duration,
+    /// How often nobody was reached in time since something came.
+    failures: u32,
     /// Lines for which a connection of their own is being opened.
     opening: [Option<Receiver<OwnLine>>; LINES],
     /// When it was last looked which lines lack one.
@@ -97,14 +97,13 @@ pub(crate) struct Keeper {
 
 impl Keeper {
     pub(crate) fn new(shared: Arc<Shared>, config: Config, places: Vec<SocketAddr>, hello: Hello) -> Self {
-        let reached_within = REACHED_WITHIN.min(3 * hello.round_trip.to_duration() + THINKS_FOR);
         let opening = Default::default();
         Self {
             shared,
             config,
             places,
             hello,
-            reached_within,
+            failures: 0,
             opening,
             completed: None,
             reopened: None,
@@ -119,7 +118,7 @@ impl Keeper {
         while !self.shared.is_over_after(LOOK) {
             let silent_for = self.shared.silent_for();
             if silent_for < ASKS_AFTER && !self.is_waiting {
-                self.answered_since = None;
+                (self.answered_since, self.failures) = (None, 0);
                 self.complete();
                 continue;
             }
@@ -127,16 +126,18 @@ impl Keeper {
             let may_be_broken = silent_for.min(open_for) > REOPENS_AFTER;
             // TCP waits longer and longer before it tries a dead path again, and so does who waits for it.
             if may_be_broken && !self.is_reachable() {
+                self.failures = self.failures.saturating_add(1);
                 continue;
             }
             let session = self.shared.kept().connection.as_ref().map(|connection| connection.zenoh().clone());
             // One that is only silent has until then to answer.
             let left = if may_be_broken { Duration::ZERO } else { REOPENS_AFTER.saturating_sub(silent_for) };
-            let within = left.max(self.reached_within);
+            let within = left.max(self.reached_within());
             match session.and_then(|session| say(&session, &self.hello, within)) {
                 Some(answer) => self.take(answer),
                 None => {
                     self.answered_since = None;
+                    self.failures = self.failures.saturating_add(1);
                     if may_be_broken {
                         self.reopen();
                     }
@@ -183,9 +184,14 @@ impl Keeper {
         opening(move || OwnLine::open(&config, session, number, &inbox))
     }
 
+    /// An answer takes no longer if somebody is there.
+    fn reached_within(&self) -> Duration {
+        reached_within(self.hello.round_trip.to_duration(), self.failures)
+    }
+
     fn is_reachable(&self) -> bool {
-        self.places.is_empty()
-            || self.places.iter().any(|place| TcpStream::connect_timeout(place, self.reached_within).is_ok())
+        let within = self.reached_within();
+        self.places.is_empty() || self.places.iter().any(|place| TcpStream::connect_timeout(place, within).is_ok())
     }
 
     fn take(&mut self, answer: Answer) {
@@ -249,6 +255,12 @@ impl Keeper {
     }
 }
 
+/// An answer takes no longer if somebody is there, where the first round trip took so long and so many attempts have failed since something
+/// came: the way may be a longer one by now.
+fn reached_within(round_trip: Duration, failures: u32) -> Duration {
+    REACHED_WITHIN.min((3 * round_trip + THINKS_FOR).saturating_mul(2_u32.saturating_pow(failures)))
+}
+
 /// What `open` opens in the background, once it is there; none if that fails. One that nobody waits for any more is closed there too.
 fn opening<T: Send + 'static>(open: impl FnOnce() -> Result<T, Error> + Send + 'static) -> Receiver<T> {
     let (send, opened) = mpsc::sync_channel(0);
@@ -269,6 +281,13 @@ mod tests {
     use super::*;
     use crate::access::Access;
     use crate::line::HELLO;
+
+    #[test]
+    fn a_way_that_has_become_longer_is_waited_for_after_a_failure() {
+        let within = |round_trip, failures| reached_within(Duration::from_millis(round_trip), failures).as_millis();
+        assert_eq!([0, 1, 2, u32::MAX].map(|failures| within(10, failures)), [130, 260, 300, 300]);
+        assert_eq!(within(200, 0), 300);
+    }
 
     /// Check that a machine whose session could not begin asks under another number, under which it may be welcome.
     #[test]
