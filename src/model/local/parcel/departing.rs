@@ -7,6 +7,7 @@ use super::{Parcel, Pressing};
 use crate::Wrench;
 use crate::body::Body;
 use crate::contact::{Contact, ToolMotion};
+use crate::simulation::Simulation;
 
 /// What is built over there, and here as far as it takes to know what that looks at.
 #[derive(Debug)]
@@ -37,14 +38,10 @@ impl Departing {
 
     /// Builds the model as far as it is looked at here; which nodes it looks at.
     fn nodes(&mut self, resync: ResyncView<'_>) -> Vec<u32> {
-        let surface = |resync: &ResyncView<'_>| {
-            let body = resync.global.body().surface();
-            let touched = resync.global.touch(resync.index).felt().iter().map(|felt| felt.point.triangle);
-            let corners = touched.flat_map(|triangle| body.triangles[triangle as usize]);
-            let around = corners.flat_map(|node| body.at_node(node).iter().copied());
-            around.flat_map(|triangle| body.triangles[triangle as usize]).collect()
-        };
-        let mut nodes: Vec<u32> = surface(&resync);
+        // What the model tells a contact area of.
+        let felt =
+            if matches!(self.model, Model::Hold) { 0..resync.global.tools() } else { resync.index..resync.index + 1 };
+        let mut nodes: Vec<u32> = felt.flat_map(|tool| touched(resync.global, tool)).collect();
         let ResyncView { global, tick, triangles, nearest, patch, tools, index, horizon, bases } = resync;
         let view = ResyncView { global: &mut *global, tick, triangles, nearest, patch, tools, index, horizon, bases };
         match &mut self.model {
@@ -73,6 +70,14 @@ impl Departing {
         nodes.dedup();
         nodes
     }
+}
+
+/// The nodes of the triangles around those that a tool touches.
+fn touched(global: &Simulation, tool: usize) -> impl Iterator<Item = u32> {
+    let surface = global.body().surface();
+    let corners = |triangle: u32| surface.triangles[triangle as usize];
+    let touched = global.touch(tool).felt().iter().flat_map(move |felt| corners(felt.point.triangle));
+    touched.flat_map(|node| surface.at_node(node).iter().copied()).flat_map(corners)
 }
 
 /// The nodes that the forces on `patch` depend on: all, if the body does not say.

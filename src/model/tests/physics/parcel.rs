@@ -1,6 +1,5 @@
 //! A local model that is built on another computer: the same as here, and nothing that is sent there can break it.
 
-use palpate_model::Vec3;
 use palpate_model::body::{Block, Body, State};
 use palpate_model::bytes::{BytesReader, BytesWriter};
 use palpate_model::contact::{Contact, Law, ToolMotion, ToolShape};
@@ -8,32 +7,45 @@ use palpate_model::local::{Image, Kind, LocalModels, ResyncView, Shipment, Templ
 use palpate_model::mesh::Face;
 use palpate_model::simulation::{Simulation, Stepping};
 use palpate_model::surroundings::{Bases, Basis, RestingBody};
+use palpate_model::{Pose, Turn, Vec3};
 use proptest::prelude::*;
 
 const PRESSES: u64 = 60;
 const HORIZON: u32 = 30;
 
-/// A block with a tool over it, and a second one beside that presses as well.
+/// A block with a tool over it, and a second one beside that presses as well: of that shape, and a point.
 fn at_rest(shape: ToolShape) -> Simulation {
+    at_rest_of([shape, ToolShape::Point])
+}
+
+/// Likewise with both shapes.
+fn at_rest_of(shapes: [ToolShape; 2]) -> Simulation {
     let builder = Block::builder([8; 3], [0.07; 3]).stiffness(30.0).node_mass(0.5e-3).damping_ratio(0.3);
     let body = builder.fix(Face::ZMin).build().unwrap();
     let state = State::at_rest(body.rest());
     let law = Law { friction: 0.5.into(), ..Law::default() };
     let stepping = Stepping { tick: 1e-3, substeps: 2 };
     let simulation = Simulation::new(Box::new(body), state, Contact::default(), law, stepping).unwrap();
-    simulation.with_tool(Contact::default()).with_shape(0, shape)
+    simulation.with_tool(Contact::default()).with_shape(0, shapes[0]).with_shape(1, shapes[1])
 }
 
 /// The same after both have pressed, the second at x = `beside` (m), and where they are.
-fn pressed(shape: ToolShape, beside: f64) -> (Simulation, [Vec3; 2]) {
-    let mut simulation = at_rest(shape);
+fn pressed(shape: ToolShape, beside: f64) -> (Simulation, [Pose; 2]) {
+    pressed_by([shape, ToolShape::Point], Turn::identity(), beside)
+}
+
+/// Likewise with both shapes, the first one turned.
+fn pressed_by(shapes: [ToolShape; 2], turn: Turn, beside: f64) -> (Simulation, [Pose; 2]) {
+    let mut simulation = at_rest_of(shapes);
     let at = |tick: u64| {
         let down = 0.0705 - 1e-4 * tick as f64;
-        [Vec3::new(0.033, 0.0362, down + shape.radius()), Vec3::new(beside, 0.0362, down)]
+        let [first, second] = shapes.map(|shape| down + shape.radius());
+        let first = Pose { position: Vec3::new(0.033, 0.0362, first), orientation: turn };
+        [first, Pose::at(Vec3::new(beside, 0.0362, second))]
     };
     for tick in 0..PRESSES {
         let [from, to] = [at(tick), at(tick + 1)];
-        simulation.tick_all(&std::array::from_fn::<_, 2, _>(|tool| ToolMotion::straight(from[tool], to[tool])));
+        simulation.tick_all(&[0, 1].map(|tool| ToolMotion { from: from[tool], to: to[tool] }));
     }
     assert!((0..2).all(|tool| simulation.contact(tool).is_touching()));
     (simulation, at(PRESSES))
@@ -51,7 +63,7 @@ fn patch_and_bases(simulation: &Simulation) -> (Vec<u32>, Bases) {
 }
 
 /// Builds one model that serves both tools if it resolves them, else two.
-fn build(models: &mut LocalModels, (simulation, tools): (&mut Simulation, &[Vec3; 2]), patch: &[u32], bases: &Bases) {
+fn build(models: &mut LocalModels, (simulation, tools): (&mut Simulation, &[Pose; 2]), patch: &[u32], bases: &Bases) {
     let nearest: [u32; 2] = std::array::from_fn(|tool| simulation.contact(tool).triangle.unwrap());
     for index in 0..2 {
         if index == 0 || !models.share(0, index) {
@@ -71,17 +83,23 @@ fn build(models: &mut LocalModels, (simulation, tools): (&mut Simulation, &[Vec3
 }
 
 /// What the tools feel in each tick of a drag of both.
-fn drag(models: &mut LocalModels, from: [Vec3; 2]) -> Vec<[Vec3; 2]> {
-    let at = |tick: u32| from.map(|from| from + Vec3::new(2e-4, 1e-4, -5e-5) * f64::from(tick));
+fn drag(models: &mut LocalModels, from: [Pose; 2]) -> Vec<[Vec3; 2]> {
+    drag_for(40, models, from)
+}
+
+/// Likewise for so many ticks.
+fn drag_for(ticks: u32, models: &mut LocalModels, from: [Pose; 2]) -> Vec<[Vec3; 2]> {
+    let way = |tick: u32| Vec3::new(2e-4, 1e-4, -5e-5) * f64::from(tick);
+    let at = |tick: u32| from.map(|from| Pose { position: from.position + way(tick), ..from });
     let motions = |tick| {
         let [from, to] = [at(tick), at(tick + 1)];
-        [0, 1].map(|tool| ToolMotion::straight(from[tool], to[tool]))
+        [0, 1].map(|tool| ToolMotion { from: from[tool], to: to[tool] })
     };
     let felt = |tick| {
         models.tick(&motions(tick));
         [0, 1].map(|tool| models.wrench(tool).force)
     };
-    (0..40).map(felt).collect()
+    (0..ticks).map(felt).collect()
 }
 
 fn empty(template: &Template) -> LocalModels {
@@ -91,7 +109,7 @@ fn empty(template: &Template) -> LocalModels {
 /// What is sent of the models of a body that has been pressed.
 fn sent(
     template: &Template,
-    pressed: (&mut Simulation, &[Vec3; 2]),
+    pressed: (&mut Simulation, &[Pose; 2]),
     (patch, bases): (&[u32], &Bases),
 ) -> (Shipment, Vec<u8>) {
     let mut departing = LocalModels::new(2, || template.departing());
@@ -145,6 +163,35 @@ fn models_that_are_built_over_there_are_those_that_would_be_built_here() {
     assert!(shared.iter().all(|&count| count >= 6), "models for both tools, and one for each: {shared:?}");
 }
 
+/// The models of both tools as they are built here, and over there.
+fn here_and_there(
+    template: &Template,
+    pressed: (&mut Simulation, &[Pose; 2]),
+    shapes: [ToolShape; 2],
+) -> [LocalModels; 2] {
+    let [mut here, mut there] = [empty(template), empty(template)];
+    let none = Bases::default();
+    let (simulation, tools) = pressed;
+    build(&mut here, (&mut *simulation, tools), &[], &none);
+    let (_, bytes) = sent(template, (simulation, tools), (&[], &none));
+    let shipment = Shipment::read(&mut BytesReader(&bytes)).unwrap();
+    assert!(Image::new(at_rest_of(shapes)).rebuild(&shipment, &none, &mut there));
+    [here, there]
+}
+
+/// Check that `hold`, whose one model serves all tools, tells what each of them touches.
+#[test]
+fn the_contact_area_of_every_tool_is_told_over_there() {
+    let shapes = [ToolShape::Sphere { radius: 6e-3 }; 2];
+    let (mut simulation, tools) = pressed_by(shapes, Turn::identity(), 0.052);
+    let template = Template::new(Kind::Hold, [4, 4, 2], simulation.body()).unwrap();
+    let [here, there] = here_and_there(&template, (&mut simulation, &tools), shapes);
+    for tool in 0..2 {
+        let [here, there] = [&here, &there].map(|models| models.of(tool).contact_area(tool));
+        assert!(here > 1e-5 && there == here, "tool {tool}: {here} m^2 here, {there} m^2 there");
+    }
+}
+
 /// Check that a computer where one tool is felt gets the model of that alone, feels in it what it would with all, and that one where the
 /// other tool is felt too takes no shipment that lacks it.
 #[test]
@@ -189,12 +236,12 @@ fn a_tool_that_is_put_elsewhere_tears_nothing_along() {
         let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
         let mut models = empty(&template);
         build(&mut models, (&mut simulation, &tools), &patch, &bases);
-        let rests = |place: Vec3| ToolMotion::straight(place, place);
+        let rests = |pose: Pose| ToolMotion { from: pose, to: pose };
         models.tick(&tools.map(rests));
         let before = models.wrench(0).force;
         assert!(before.norm() > 0.1 && models.wrench(1).force.norm() > 0.1, "{kind:?}: both press");
         for _ in 0..20 {
-            models.tick(&[rests(tools[0]), rests(Vec3::new(-0.03, 0.0362, 0.03))]);
+            models.tick(&[rests(tools[0]), rests(Pose::at(Vec3::new(-0.03, 0.0362, 0.03)))]);
             let apart = (models.wrench(0).force - before).norm();
             // What the second one pressed down comes up to the first.
             assert!(apart < before.norm(), "{kind:?}: {apart} of {}", before.norm());
@@ -273,7 +320,7 @@ proptest! {
         let template = Template::new(kind, [4, 4, 2], simulation.body()).unwrap();
         let mut models = empty(&template);
         if Image::new(simulation).rebuild(&shipment, &Bases::default(), &mut models) {
-            drag(&mut models, [0.033, 0.052].map(|x| Vec3::new(x, 0.0362, 0.07)));
+            drag(&mut models, [0.033, 0.052].map(|x| Pose::at(Vec3::new(x, 0.0362, 0.07))));
         }
     }
 }
