@@ -64,7 +64,7 @@ impl Hello {
         to.list(&self.tools, |to, (name, pose)| {
             write_text(to, name);
             to.u8(pose.is_some().into());
-            pose.iter().for_each(|pose| message::write_pose(to, pose));
+            pose.iter().for_each(|pose| to.pose(pose));
         });
     }
 

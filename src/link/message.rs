@@ -12,17 +12,17 @@
 use std::fmt;
 
 use super::lane::Lane;
+use crate::model::Pose;
 use crate::model::body::Stiffness;
 use crate::model::bytes::{BytesReader, BytesWriter};
 use crate::model::contact::Friction;
 use crate::model::local::Shipment;
 use crate::model::surroundings::Basis;
-use crate::model::{Pose, turn_of, wxyz};
 use crate::runtime::Nanos;
 
 const MAGIC: [u8; 4] = *b"plnk";
 /// The version of the format: of another one nothing is read.
-pub const VERSION: u16 = 8;
+pub const VERSION: u16 = 9;
 /// No message is longer (bytes).
 pub const LARGEST: usize = 1 << 25;
 
@@ -38,8 +38,6 @@ const TICK: usize = 8 * 8;
 const LAST_TICK: u64 = 1 << 40;
 /// No tool is farther away (m): what a body would be pulled to by one that is would be no number for long.
 const FARTHEST: f64 = 1e3;
-/// How far from one the length of a turn may be.
-const UPRIGHT: f64 = 1e-6;
 
 /// The header of every message of a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -152,7 +150,7 @@ impl Message {
                 to.u16(*tool);
                 to.list(&ticks[ticks.len().saturating_sub(MOST_TICKS)..], |to, (tick, pose)| {
                     to.u64(*tick);
-                    write_pose(to, pose);
+                    to.pose(pose);
                 });
             }
             Self::Models(shipment) => shipment.write(to),
@@ -308,11 +306,6 @@ fn read_header(from: &mut BytesReader<'_>) -> Option<Header> {
     Some(Header { epoch: from.u64()?, number: from.u64()?, sent: Nanos(from.u64()?) })
 }
 
-pub(super) fn write_pose(to: &mut BytesWriter<'_>, pose: &Pose) {
-    to.vector(&pose.position);
-    wxyz(&pose.orientation).iter().for_each(|&part| to.f64(part));
-}
-
 fn read_tick(from: &mut BytesReader<'_>) -> Option<(u64, Pose)> {
     Some((from.u64().filter(|&tick| tick <= LAST_TICK)?, read_pose(from)?))
 }
@@ -323,20 +316,18 @@ fn read_place(from: &mut BytesReader<'_>) -> Option<[f32; 3]> {
     place.iter().all(|coordinate| f64::from(coordinate.abs()) <= FARTHEST).then_some(place)
 }
 
-/// A pose in reach, whose turn turns.
+/// A pose in reach.
 pub(super) fn read_pose(from: &mut BytesReader<'_>) -> Option<Pose> {
-    let position = from.vector().filter(|place| place.amax() <= FARTHEST)?;
-    let orientation = turn_of([from.f64()?, from.f64()?, from.f64()?, from.f64()?]);
-    ((orientation.norm() - 1.0).abs() <= UPRIGHT).then_some(Pose { position, orientation })
+    from.pose().filter(|pose| pose.position.amax() <= FARTHEST)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Vec3;
     use crate::model::body::Block;
     use crate::model::local::{Kind, LocalModels, Template};
     use crate::model::mesh::Face;
+    use crate::model::{Vec3, turn_of};
 
     const HEADER: Header = Header { epoch: 3, number: 9, sent: Nanos(5) };
 

@@ -2,7 +2,10 @@
 //!
 //! Little-endian. Whoever reads believes no count before there are bytes for it: what is asked of memory is bounded by what came.
 
-use crate::Vec3;
+use crate::{Pose, Vec3, turn_of, wxyz};
+
+/// How far from one the length of a turn may be.
+const UPRIGHT: f64 = 1e-6;
 
 /// Appends numbers to bytes.
 ///
@@ -45,6 +48,12 @@ impl BytesWriter<'_> {
     /// A vector to the last bit.
     pub fn vector(&mut self, vector: &Vec3) {
         vector.iter().for_each(|&component| self.f64(component));
+    }
+
+    /// A pose to the last bit.
+    pub fn pose(&mut self, pose: &Pose) {
+        self.vector(&pose.position);
+        wxyz(&pose.orientation).iter().for_each(|&part| self.f64(part));
     }
 
     /// A number in as few bytes as it needs: seven bits each (LEB128).
@@ -111,6 +120,13 @@ impl<'a> BytesReader<'a> {
     /// A vector whose components are finite.
     pub fn vector(&mut self) -> Option<Vec3> {
         Some(Vec3::new(self.f64()?, self.f64()?, self.f64()?))
+    }
+
+    /// A pose whose numbers are finite and whose turn turns.
+    pub fn pose(&mut self) -> Option<Pose> {
+        let position = self.vector()?;
+        let orientation = turn_of([self.f64()?, self.f64()?, self.f64()?, self.f64()?]);
+        ((orientation.norm() - 1.0).abs() <= UPRIGHT).then_some(Pose { position, orientation })
     }
 
     /// What [`BytesWriter::varint`] wrote.

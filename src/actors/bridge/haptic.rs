@@ -278,9 +278,9 @@ impl HapticBridge {
 
     /// Puts the tools that are elsewhere where the first models say, unless something newer has come.
     fn place_others(&mut self) {
-        let places: Vec<Vec3> = self.arrived.iter().flat_map(Shipment::places).collect();
+        let poses: Vec<Pose> = self.arrived.iter().flat_map(Shipment::poses).collect();
         for (number, other) in self.others().filter(|(_, other)| other.is_new()) {
-            places.get(number).iter().for_each(|&&place| other.put(Pose::at(place)));
+            poses.get(number).iter().for_each(|&&pose| other.put(pose));
         }
     }
 

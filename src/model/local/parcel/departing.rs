@@ -101,7 +101,7 @@ impl LocalModel for Departing {
             let touch = global.touch(number);
             (pressing.contact, pressing.steady, pressing.wrench) =
                 (touch.contact, touch.steady(), global.wrench(number));
-            pressing.place = tools[number].position;
+            pressing.pose = tools[number].pose(0.0);
             touch.felt().clone_into(&mut pressing.felt);
             pressing.exerted = global.exerted(number);
         }

@@ -78,7 +78,7 @@ impl Image {
             self.simulation.be_told_of(tool, pressing.wrench, &pressing.exerted, |touch| {
                 touch.go_on_from(pressing.contact, pressing.steady, &pressing.felt);
             });
-            self.tools[tool] = ToolForecast::at_rest(pressing.place);
+            self.tools[tool] = ToolForecast::at_rest(pressing.pose);
         }
         Some(ResyncView {
             global: &mut self.simulation,

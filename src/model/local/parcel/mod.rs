@@ -14,7 +14,7 @@ use crate::body::{State, Stiffness};
 use crate::bytes::{BytesReader, BytesWriter};
 use crate::contact::{Contact, ContactMode, ContactPoint, Felt, Friction, Steady};
 use crate::surroundings::Bases;
-use crate::{Vec3, Wrench};
+use crate::{Pose, Vec3, Wrench};
 
 pub(super) use departing::{Departing, Model};
 pub use image::Image;
@@ -53,8 +53,8 @@ pub struct Parcel {
 /// How a tool presses.
 #[derive(Clone, Debug, Default)]
 struct Pressing {
-    /// Where it is (m).
-    place: Vec3,
+    /// Where it is, and how it is turned.
+    pose: Pose,
     contact: Contact,
     steady: Steady,
     felt: Vec<Felt>,
@@ -68,7 +68,7 @@ const NODE: usize = 4;
 const STATE: usize = NODE + 6 * 8;
 const PRESSED: usize = NODE + 3 * 8;
 const FELT: usize = NODE + 15 * 8 + 2;
-const PRESSING: usize = 3 * NODE + 17 * 8 + 3;
+const PRESSING: usize = 3 * NODE + 21 * 8 + 3;
 /// Places at which a tool touches.
 const MOST_FELT: usize = 1024;
 
@@ -140,7 +140,7 @@ impl Parcel {
 }
 
 fn write_pressing(to: &mut BytesWriter<'_>, tool: &Pressing) {
-    to.vector(&tool.place);
+    to.pose(&tool.pose);
     write_contact(to, &tool.contact);
     let Steady { force, fineness, is_fine } = tool.steady;
     [force, fineness].into_iter().for_each(|number| to.f64(number));
@@ -155,10 +155,10 @@ fn write_pressing(to: &mut BytesWriter<'_>, tool: &Pressing) {
 }
 
 fn read_pressing(from: &mut BytesReader<'_>) -> Option<Pressing> {
-    let (place, contact) = (from.vector()?, read_contact(from)?);
+    let (pose, contact) = (from.pose()?, read_contact(from)?);
     let [force, fineness] = [from.f64()?, from.f64().filter(|fineness| (0.0..=1.0).contains(fineness))?];
     let steady = Steady { force, fineness, is_fine: read_bool(from)? };
-    let mut tool = Pressing { place, contact, steady, ..Pressing::default() };
+    let mut tool = Pressing { pose, contact, steady, ..Pressing::default() };
     from.list(FELT, &mut tool.felt, read_felt)?;
     tool.wrench = Wrench { force: from.vector()?, torque: from.vector()? };
     from.list(PRESSED, &mut tool.exerted, |from| Some((from.u32()?, from.vector()?)))?;

@@ -1,7 +1,7 @@
 //! The parcels of one resync.
 
 use super::{Parcel, path};
-use crate::Vec3;
+use crate::Pose;
 use crate::bytes::{BytesReader, BytesWriter};
 use crate::local::LocalModels;
 
@@ -95,12 +95,12 @@ impl Shipment {
         self.parcels.iter_mut().for_each(|parcel| parcel.tick = tick);
     }
 
-    /// Where each tool is (m).
+    /// Where each tool is, and how it is turned.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub fn places(&self) -> impl Iterator<Item = Vec3> {
-        self.parcels.first().into_iter().flat_map(|parcel| parcel.tools.iter().map(|tool| tool.place))
+    pub fn poses(&self) -> impl Iterator<Item = Pose> {
+        self.parcels.first().into_iter().flat_map(|parcel| parcel.tools.iter().map(|tool| tool.pose))
     }
 
     /// One for each model that serves somebody.

@@ -192,6 +192,23 @@ fn the_contact_area_of_every_tool_is_told_over_there() {
     }
 }
 
+/// Check that a capsule that lies on the body is known to lie there: what it feels beyond its window hangs on how deep it was in it.
+#[test]
+fn a_tool_that_is_turned_leaves_its_window_over_there_as_here() {
+    let shapes = [ToolShape::Capsule { radius: 5e-3, half_axis: Vec3::z() * 0.008 }, ToolShape::Point];
+    let lies = Turn::from_axis_angle(&Vec3::y_axis(), std::f64::consts::FRAC_PI_2);
+    let (mut simulation, tools) = pressed_by(shapes, lies, 0.052);
+    let template = Template::new(Kind::Patch, [4, 4, 2], simulation.body()).unwrap();
+    let models = here_and_there(&template, (&mut simulation, &tools), shapes);
+    let [here, there] = models.map(|mut models| {
+        let felt = drag_for(120, &mut models, tools);
+        assert_eq!(models.of(0).serves_as(0), Kind::Hold, "it is beyond its window");
+        felt
+    });
+    assert!(here[119][0].norm() > 0.1, "{} N", here[119][0]);
+    assert_eq!(here, there);
+}
+
 /// Check that a computer where one tool is felt gets the model of that alone, feels in it what it would with all, and that one where the
 /// other tool is felt too takes no shipment that lacks it.
 #[test]
