@@ -15,8 +15,8 @@ const HERE: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 /// Writes two folders into `folder`, `global` and `haptic`, one for each machine: its certificate, its key, the authority that both are of,
 /// and a `link.toml` that names them. `hosts` are the names or addresses by which the haptic machine reaches the global one.
 ///
-/// The authority's own key is kept nowhere: nobody can make another machine known to these two. The keys do not expire; new ones take their
-/// place when the command is repeated.
+/// The authority's own key is kept nowhere: nobody can make another machine known to these two. The keys do not expire; keys that are there
+/// are left alone, so new ones go into another folder.
 ///
 /// # Errors
 /// If a name is none, there are keys already, or a file cannot be written.
