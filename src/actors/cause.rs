@@ -16,7 +16,7 @@ pub enum Cause {
     DeviceImpossible,
     /// The local model's force is not finite: zero is commanded until the next resync.
     LocalNotFinite,
-    /// The global model's state is not finite: it is started again from the last one that was.
+    /// The global model's state is not finite: if it can be copied, it is started again from the last one that was.
     GlobalNotFinite,
     /// Samples of the tool were lost between local and global model; the path was interpolated.
     SamplesLost,

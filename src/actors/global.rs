@@ -76,6 +76,8 @@ pub struct GlobalActor {
     is_changed: bool,
     /// It goes on where another one was.
     goes_on: bool,
+    /// Another one can go on where it was.
+    is_replaceable: bool,
     /// Working memory: how each tool moves in a tick.
     motions: Vec<ToolMotion>,
 }
@@ -104,8 +106,8 @@ impl GlobalActor {
             ToolSide::new(tool, windows, history, ports)
         };
         let tools = tools.iter().zip(of_tools).enumerate().map(side).collect();
-        let (version, motions, is_changed, goes_on) = (0, Vec::new(), true, false);
-        Ok(Self { simulation, ports: shared, plan, tools, next, version, is_changed, goes_on, motions })
+        let (version, motions, is_changed, goes_on, is_replaceable) = (0, Vec::new(), true, false, false);
+        Ok(Self { simulation, ports: shared, plan, tools, next, version, is_changed, goes_on, is_replaceable, motions })
     }
 
     /// One that goes on where another was. There are local models already, and what a program has changed is known from its first release on:
@@ -113,6 +115,13 @@ impl GlobalActor {
     #[must_use]
     pub fn going_on(self) -> Self {
         Self { goes_on: true, ..self }
+    }
+
+    /// One that another can follow if it `can` be replaced: a state that is not finite is its fault then. Otherwise that is for good, and nothing
+    /// is published any more.
+    #[must_use]
+    pub fn replaceable(self, can: bool) -> Self {
+        Self { is_replaceable: can, ..self }
     }
 
     /// The haptic tick of the state.
@@ -322,7 +331,8 @@ impl Actor for GlobalActor {
             side.take_feedback(ctx, &mut self.simulation, index);
         }
         if !self.simulation.state().is_finite() {
-            return Outcome::Fault(Cause::GlobalNotFinite.code());
+            let cause = Cause::GlobalNotFinite.code();
+            return if self.is_replaceable { Outcome::Fault(cause) } else { Outcome::Degraded(cause) };
         }
         let version = self.publish_models(ctx);
         self.publish_surface(ctx);

@@ -113,8 +113,10 @@ impl GlobalMaker {
         }
         let mut ports = self.side.take();
         ports.shared.build_cost = self.build_cost.take();
-        let (first, tools) = (self.first.take(), &self.last.tools);
-        let actor = |simulation| GlobalActor::new(simulation, tools, self.plan.clone(), ports);
+        let (first, tools, can) = (self.first.take(), &self.last.tools, self.spare.is_some());
+        let actor = |simulation| -> Result<_, Error> {
+            Ok(GlobalActor::new(simulation, tools, self.plan.clone(), ports)?.replaceable(can))
+        };
         Ok(vec![Box::new(match first {
             Some(first) => actor(first)?,
             None => actor(self.restored()?)?.going_on(),
