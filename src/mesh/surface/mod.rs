@@ -5,7 +5,7 @@ mod crossing;
 mod welded;
 
 pub use checks::{SurfaceFindings, SurfacePart};
-pub(crate) use welded::Welded;
+pub(crate) use welded::{PlaceKey, Welded, place_key};
 
 use palpate_model::Vec3;
 

@@ -6,11 +6,20 @@ use palpate_model::Vec3;
 
 use crate::SurfaceMesh;
 
+/// What tells a place from others, to the last bit.
+pub type PlaceKey = [u64; 3];
+
+/// The key of a place.
+pub fn place_key(place: &Vec3) -> PlaceKey {
+    // Zero has two signs.
+    <[f64; 3]>::from(place.add_scalar(0.0)).map(f64::to_bits)
+}
+
 /// Collects triangles. Those with two corners at one place are left out: they have no area, and their neighbours close the gap.
 #[derive(Debug, Default)]
 pub struct Welded {
     mesh: SurfaceMesh,
-    nodes: HashMap<[u64; 3], u32>,
+    nodes: HashMap<PlaceKey, u32>,
 }
 
 impl Welded {
@@ -23,10 +32,9 @@ impl Welded {
     }
 
     fn node(&mut self, place: Vec3) -> u32 {
-        // Zero has two signs.
-        let place = place.add_scalar(0.0);
-        *self.nodes.entry([place.x, place.y, place.z].map(f64::to_bits)).or_insert_with(|| {
-            self.mesh.points.push(place);
+        let key = place_key(&place);
+        *self.nodes.entry(key).or_insert_with(|| {
+            self.mesh.points.push(Vec3::from(key.map(f64::from_bits)));
             self.mesh.points.len() as u32 - 1
         })
     }

@@ -7,6 +7,7 @@ use palpate_model::Vec3;
 use crate::error::MeshError;
 use crate::files::VolumeFile;
 use crate::files::collected::{Collected, TETRAHEDRON};
+use crate::surface::{PlaceKey, place_key};
 
 /// Most different numbers of an array that become groups: beyond, it numbers the cells.
 const MOST_VALUES: usize = 64;
@@ -19,7 +20,7 @@ const GHOSTS: [&str; 2] = ["vtkGhostType", "vtkGhostLevels"];
 const REPEATED_OR_HIDDEN: i64 = 1 | 32;
 
 /// The nodes of earlier pieces by their places: a place where pieces meet is one node.
-type Border = HashMap<[u64; 3], u32>;
+type Border = HashMap<PlaceKey, u32>;
 
 /// A piece of a file.
 #[derive(Debug, Default)]
@@ -121,10 +122,11 @@ fn numbered(places: impl Iterator<Item = Vec3>, points: &mut Vec<Vec3>, border: 
         points.len() as u32 - 1
     };
     let Some(border) = border else { return places.map(add).collect() };
-    // Zero has two signs.
-    let key = |place: &Vec3| <[f64; 3]>::from(place.add_scalar(0.0)).map(f64::to_bits);
-    let numbered: Vec<_> =
-        places.map(|place| (key(&place), border.get(&key(&place)).copied().unwrap_or_else(|| add(place)))).collect();
+    let number = |place: Vec3| {
+        let key = place_key(&place);
+        (key, border.get(&key).copied().unwrap_or_else(|| add(place)))
+    };
+    let numbered: Vec<_> = places.map(number).collect();
     border.extend(numbered.iter().copied());
     numbered.into_iter().map(|(_, number)| number).collect()
 }
