@@ -165,7 +165,13 @@ fn run(execution: Execution, ms: u64, buffered_ms: u64, sink: Option<Box<dyn Log
     });
     graph.group(RateGroup::hz(1000).name("local"), vec![haptic]);
     if let (Some(drain), Some(sink)) = (drain, sink) {
-        let logger = LoggerActor::new(drain, Given(sink), environment(execution), graph.grants(), outcome.clone());
+        let logger = LoggerActor::new(
+            drain,
+            Given(sink, Gate::default()),
+            environment(execution),
+            graph.grants(),
+            outcome.clone(),
+        );
         graph.group(RateGroup::hz(20).name("logger").observer(), vec![Box::new(logger)]);
     }
     finish(graph.until(Nanos(ms * MS)).build().unwrap(), &outcome, &ticks)
@@ -185,8 +191,8 @@ fn on(disk: &Disk, execution: Execution) -> Box<dyn LogSink> {
     Box::new(LogFile::new(disk.clone(), "disk", &environment(execution)).unwrap())
 }
 
-/// A sink in a box.
-struct Given(Box<dyn LogSink>);
+/// A sink in a box, and a gate that opens before the sink is finished.
+struct Given(Box<dyn LogSink>, Gate);
 
 impl LogSink for Given {
     fn record(&mut self, record: &LogRecord) -> Result<(), Error> {
@@ -208,6 +214,7 @@ impl LogSink for Given {
         self.0.ending();
     }
     fn finish(&mut self) -> Result<(), Error> {
+        self.1.open();
         self.0.finish()
     }
     fn take_loss(&mut self) -> Option<palpate::actors::Loss> {
@@ -342,38 +349,10 @@ fn a_gap_is_told_in_the_log_with_its_times() {
 // Check that the end of the log says so itself: the disk takes nothing until the run is over, and then everything.
 #[test]
 fn a_gap_that_is_open_at_the_end_of_a_run_is_told_in_the_log() {
-    struct OpensAtTheEnd(LogFile, Gate);
-    impl LogSink for OpensAtTheEnd {
-        fn record(&mut self, record: &LogRecord) -> Result<(), Error> {
-            self.0.record(record)
-        }
-        fn text(&mut self, event: &TextEvent) -> Result<(), Error> {
-            self.0.text(event)
-        }
-        fn stats(&mut self, stats: &GroupStats) -> Result<(), Error> {
-            self.0.stats(stats)
-        }
-        fn environment(&mut self, environment: &Environment) {
-            self.0.environment(environment);
-        }
-        fn flush(&mut self, log_time: Nanos, now: Nanos) -> Result<(), Error> {
-            self.0.flush(log_time, now)
-        }
-        fn ending(&mut self) {
-            self.0.ending();
-        }
-        fn finish(&mut self) -> Result<(), Error> {
-            self.1.open();
-            self.0.finish()
-        }
-        fn take_loss(&mut self) -> Option<palpate::actors::Loss> {
-            self.0.take_loss()
-        }
-    }
     let (gate, disk) = (Gate::default(), Disk::new(healthy));
     // The log of a run in real time does not wait for its disk; that the run is in simulated time makes the test short.
     let file = LogFile::new(Gated(gate.clone(), disk.clone()), "disk", &environment(Execution::Threaded)).unwrap();
-    let ran = run(Execution::Virtual, 15_000, 4000, Some(Box::new(OpensAtTheEnd(file, gate))));
+    let ran = run(Execution::Virtual, 15_000, 4000, Some(Box::new(Given(Box::new(file), gate))));
     let (got, damage) = disk.read();
     assert_eq!((damage, ran.error.is_none()), (None, true), "{:?}", ran.error);
     let mut read = Analysis::default();
@@ -474,7 +453,7 @@ fn a_killed_logger_costs_records_and_no_tick() {
             Outcome::Continue
         });
         graph.group(RateGroup::hz(1000).name("local"), vec![haptic]);
-        let sink = Given(on(&disk, execution));
+        let sink = Given(on(&disk, execution), Gate::default());
         let logger = LoggerActor::new(drain, sink, environment(execution), graph.grants(), outcome.clone());
         let logger = Killed { logger, at: 10, hangs };
         graph.group(RateGroup::hz(20).name("logger").observer(), vec![Box::new(logger)]);
