@@ -19,6 +19,7 @@ use moving::Moving;
 pub(crate) use told::Told;
 
 pub use snapshot::Snapshot;
+pub(crate) use stepping::Part;
 pub use stepping::Stepping;
 
 /// A body, its state and the contacts of the tools with it. Tools are numbered in the order of their devices.

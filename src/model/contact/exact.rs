@@ -13,8 +13,11 @@ use crate::Vec3;
 
 /// More unknowns than this are left to the sweeps.
 const MOST_UNKNOWNS: usize = 64;
-/// Places that can stand for each other make the system singular; so much more of its diagonal does not.
-const MORE: f64 = 1e-10;
+/// Places that can stand for each other make the system singular; so much more of its diagonal does not. More of it where places that hardly
+/// differ would push against each other, and what is between them to any speed.
+const MORE: [f64; 2] = [1e-10, 1e-3];
+/// No impulse takes so many times more speed from its place than any place closes with.
+const MOST: f64 = 10.0;
 
 /// One unknown of the system.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +85,25 @@ impl Exact {
                 _ => {}
             }
         }
+        MORE.into_iter().any(|more| {
+            self.fill(rows, nearness, answers, closing, d);
+            let fastest = rows.iter().map(|row| row.closing.norm());
+            let fastest = self.right.iter().map(|right| right.abs()).chain(fastest).fold(0.0, f64::max);
+            let is_slow =
+                |(unknown, change): (&Unknown, &f64)| (change * rows[unknown.place].compliance).abs() <= MOST * fastest;
+            eliminate(&mut self.matrix, &mut self.right, more) && self.unknowns.iter().zip(&self.right).all(is_slow)
+        })
+    }
+
+    /// Writes the system of the unknowns.
+    fn fill<C: Copy + Default + Mul<Vec3, Output = Vec3>>(
+        &mut self,
+        rows: &[Row],
+        nearness: &Nearness,
+        answers: &Columns<C>,
+        closing: &[Vec3],
+        d: f64,
+    ) {
         self.matrix.clear();
         self.right.clear();
         for one in &self.unknowns {
@@ -96,7 +118,6 @@ impl Exact {
                 self.matrix.push(answer);
             }
         }
-        eliminate(&mut self.matrix, &mut self.right)
     }
 
     /// How many changes were found.
@@ -121,10 +142,11 @@ impl Exact {
     }
 }
 
-/// Solves a dense system in place, row by row, by elimination with row pivots; `false` if it is singular.
-fn eliminate(matrix: &mut [f64], right: &mut [f64]) -> bool {
+/// Solves a dense system, with so much `more` of its diagonal, in place, row by row, by elimination with row pivots; `false` if it is
+/// singular.
+fn eliminate(matrix: &mut [f64], right: &mut [f64], more: f64) -> bool {
     let n = right.len();
-    (0..n).for_each(|i| matrix[i * n + i] *= 1.0 + MORE);
+    (0..n).for_each(|i| matrix[i * n + i] *= 1.0 + more);
     for column in 0..n {
         let size = |row: usize| matrix[row * n + column].abs();
         let pivot = (column..n).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or(column);
@@ -155,17 +177,64 @@ fn eliminate(matrix: &mut [f64], right: &mut [f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::grain::Sunk;
     use super::*;
+
+    /// A place that sticks and closes at `closing` (m/s), which all places of its tool and their answers of 1/kg are about.
+    fn sticking(closing: Vec3) -> Row {
+        Row {
+            tool: 0,
+            triangle: 0,
+            weights: [1.0, 0.0, 0.0],
+            feature: [0, u32::MAX, u32::MAX],
+            share: 0.0,
+            place: Vec3::zeros(),
+            normal: Vec3::z(),
+            target: Vec3::zeros(),
+            closing,
+            allowed: 0.0,
+            compliance: 1.0,
+            along: 1.0,
+            sinking: None,
+            sunk: Sunk::default(),
+            stuck: true,
+            glued: false,
+            mode: ContactMode::Stick,
+            impulse: Vec3::z() * 0.1,
+            before: 0.0,
+            nodes: (0, 1),
+        }
+    }
+
+    /// Check that two places that are all but one, and do not move quite alike, do not push against each other: the difference is next to
+    /// nothing, and so is what would take it away. What they have in common is taken away.
+    #[test]
+    fn places_that_are_all_but_one_do_not_push_each_other() {
+        let rows = [Vec3::new(0.1, 0.0, 1.0), Vec3::new(0.1, 0.02, 1.01)].map(sticking);
+        let (mut answers, mut nearness, mut exact) = (Columns::default(), Nearness::with_room(2), Exact::default());
+        nearness.find(&rows);
+        answers.begin(2);
+        for place in 0..2 {
+            answers.of(place, |column| (0..2).for_each(|at| column[at] = if at == place { 1.0 } else { 1.0 - 1e-7 }));
+        }
+        assert!(exact.solve(&rows, &nearness, &answers, &rows.map(|row| row.closing), 1e-3));
+        let mut sums = [Vec3::zeros(); 2];
+        for (place, change) in (0..exact.unknowns()).map(|unknown| exact.change(unknown)) {
+            sums[place] += change;
+        }
+        assert!(sums.iter().all(|sum| sum.norm() < 20.0), "{sums:?}");
+        assert!((sums[0] + sums[1] - Vec3::new(0.1, 0.01, 1.005)).norm() < 1e-3, "{sums:?}");
+    }
 
     #[test]
     fn elimination_solves_and_tells_what_it_cannot() {
         let mut right = [5.0, 10.0, 7.0];
         // Without row pivots the first would be zero.
-        assert!(eliminate(&mut [0.0, 1.0, 1.0, 2.0, 1.0, 2.0, 1.0, 3.0, 0.0], &mut right));
+        assert!(eliminate(&mut [0.0, 1.0, 1.0, 2.0, 1.0, 2.0, 1.0, 3.0, 0.0], &mut right, 1e-10));
         for (found, known) in right.into_iter().zip([1.0, 2.0, 3.0]) {
             assert!((found - known).abs() < 1e-8, "{right:?}");
         }
-        assert!(!eliminate(&mut [0.0; 4], &mut [1.0, 1.0]));
-        assert!(!eliminate(&mut [f64::NAN; 1], &mut [1.0]));
+        assert!(!eliminate(&mut [0.0; 4], &mut [1.0, 1.0], 1e-10));
+        assert!(!eliminate(&mut [f64::NAN; 1], &mut [1.0], 1e-10));
     }
 }

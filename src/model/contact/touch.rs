@@ -38,7 +38,7 @@ pub(crate) struct Touch {
     pub(crate) stiffness: Stiffness,
     /// What it has pressed with lately.
     pub(super) steady: Steady,
-    /// Where a tool with a shape touched in this tick; forces are summed over its steps, and means once it is over.
+    /// Where a tool with a shape touched in this tick; instead of forces it has their impulses (N s) until it is over.
     felt: Vec<Felt>,
     /// The same for whoever watches: forces are means over the last whole tick, triangles the body's.
     points: Vec<ContactPoint>,
@@ -89,10 +89,9 @@ impl Touch {
         self.felt.iter_mut().for_each(|felt| felt.point.force = Vec3::zeros());
     }
 
-    /// A tick of `steps` steps is over: forces are means over it. `id` gives the body's id of a triangle.
-    pub(crate) fn end(&mut self, steps: u32, id: impl Fn(u32) -> u32) {
-        let share = 1.0 / f64::from(steps);
-        self.felt.iter_mut().for_each(|felt| felt.point.force *= share);
+    /// A tick of `duration` seconds is over: forces are means over it. `id` gives the body's id of a triangle.
+    pub(crate) fn end(&mut self, duration: f64, id: impl Fn(u32) -> u32) {
+        self.felt.iter_mut().for_each(|felt| felt.point.force /= duration);
         self.points.clear();
         let points = self.felt.iter().map(|felt| ContactPoint { triangle: id(felt.point.triangle), ..felt.point });
         self.points.extend(points);
@@ -143,7 +142,7 @@ impl Touch {
         (self.contact, self.steady) = (contact, steady);
         self.felt.clear();
         self.felt.extend_from_slice(&felt[..felt.len().min(MOST_POINTS)]);
-        self.end(1, |triangle| triangle);
+        self.end(1.0, |triangle| triangle);
     }
 
     /// Lets the tool touch nothing until it meets something, unless it is glued; whether it does.
@@ -247,12 +246,12 @@ impl Touch {
                 largest = along;
                 found = Contact { triangle: Some(row.triangle), weights: row.weights, ..found };
             }
-            let point =
-                ContactPoint { triangle: row.triangle, place: row.place, normal: row.normal, force, mode: row.mode };
+            let (triangle, place, normal, mode) = (row.triangle, row.place, row.normal, row.mode);
+            let point = ContactPoint { triangle, place, normal, force: row.impulse, mode };
             let felt =
                 Felt { feature: row.feature, weights: row.weights, point, is_pressing: true, impulse: row.impulse };
             if let Some(known) = self.felt.iter_mut().find(|felt| felt.feature == row.feature && !felt.is_pressing) {
-                let force = known.point.force + force;
+                let force = known.point.force + row.impulse;
                 *known = Felt { point: ContactPoint { force, ..point }, ..felt };
             } else if self.felt.len() < MOST_POINTS {
                 self.felt.push(felt);

@@ -1,6 +1,6 @@
 //! A body in motion with the contacts of its tools: what a simulation advances, and what runs ahead of it.
 
-use super::stepping::Stepping;
+use super::stepping::{Part, Stepping};
 use crate::body::{Body, State, Stiffened, Stiffness};
 use crate::contact::{Deformable, Law, Rows, ToolMotion, Touch, step_all};
 use crate::{Vec3, Wrench};
@@ -33,17 +33,13 @@ impl Moving {
         assert!((1..=*stride).contains(&ticks), "{ticks} ticks in steps of at most {stride}");
         means.fill(Wrench::default());
         touches.iter_mut().for_each(Touch::begin);
-        body.forces(state, forces);
-        let divided = stepping.divided(body.stable_share(state));
-        let parts = divided.substeps / stepping.substeps;
-        let (n, d) = (f64::from(divided.substeps), f64::from(ticks) * divided.step());
-        for step in 0..divided.substeps {
-            if step > 0 {
-                body.forces(state, forces);
-            }
-            if step % parts == 0 {
+        let (mut way, step) = (stepping.through(), f64::from(ticks) * stepping.step());
+        while !way.is_over() {
+            body.forces(state, forces);
+            if way.begins_step() {
                 watch(state);
             }
+            let Part { shares: [from, to], length, .. } = way.next(body.stable_share(state));
             let mut deformable = Deformable {
                 positions: &mut state.positions,
                 velocities: &mut state.velocities,
@@ -51,12 +47,12 @@ impl Moving {
                 surface: body.surface(),
                 candidates,
             };
-            let part = |tool| motion(tool).part(f64::from(step) / n, f64::from(step + 1) / n);
-            step_all(&mut deformable, forces, touches, rows, law, part, d);
-            means.iter_mut().zip(&*touches).for_each(|(sum, touch)| *sum += touch.wrench);
+            let part = |tool| motion(tool).part(from, to);
+            step_all(&mut deformable, forces, touches, rows, law, part, step * length);
+            means.iter_mut().zip(&*touches).for_each(|(sum, touch)| *sum += touch.wrench * length);
         }
-        means.iter_mut().for_each(|sum| *sum = *sum / n);
-        touches.iter_mut().for_each(|touch| touch.end(divided.substeps, |triangle| triangle));
+        means.iter_mut().for_each(|sum| *sum = *sum / f64::from(stepping.substeps));
+        touches.iter_mut().for_each(|touch| touch.end(f64::from(ticks) * stepping.tick, |triangle| triangle));
     }
 
     /// The body is so stiff from now on.

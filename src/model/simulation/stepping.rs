@@ -16,10 +16,10 @@ pub struct Stepping {
 }
 
 /// How many times shorter than at rest the longest stable step may be before steps are divided. They have a margin of 1.3, most of which
-/// is left for what the body does within the tick, and for what it does not know of itself.
+/// is left for what the body does within the step, and for what it does not know of itself.
 const BORNE: f64 = 1.05;
-/// Parts of a step at most: a late tick is better than a body that flies apart.
-const MOST_PARTS: f64 = 16.0;
+/// No part of a step is shorter than this share of it: a late tick is better than a body that flies apart, but it must end.
+const SHORTEST: f64 = 1.0 / 64.0;
 
 impl Default for Stepping {
     /// One substep per millisecond.
@@ -42,17 +42,56 @@ impl Stepping {
         self.tick / f64::from(self.substeps)
     }
 
-    /// The same with every step in so many parts that a body whose longest stable step is `share` of that at rest bears them.
-    pub(crate) fn divided(&self, share: f64) -> Self {
-        // What is not a number is zero parts.
-        let parts = (1.0 / (BORNE * share)).ceil().clamp(1.0, MOST_PARTS) as u32;
-        Self { substeps: self.substeps * parts.max(1), ..*self }
+    /// The way through one tick.
+    pub(crate) fn through(&self) -> Through {
+        Through { substeps: self.substeps, step: 0, done: 0.0 }
+    }
+}
+
+/// The way through a tick, step by step, each of them in parts that the body bears.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Through {
+    substeps: u32,
+    /// Steps that are over.
+    step: u32,
+    /// Share of the next one that is done.
+    done: f64,
+}
+
+/// A step of a tick, or a part of one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Part {
+    /// Where it begins and ends in the tick, in steps.
+    pub(crate) steps: [f64; 2],
+    /// The same as shares of the tick.
+    pub(crate) shares: [f64; 2],
+    /// How long it is, as a share of a step.
+    pub(crate) length: f64,
+}
+
+impl Through {
+    /// True once the tick is over.
+    pub(crate) fn is_over(&self) -> bool {
+        self.step == self.substeps
     }
 
-    /// The parts of one tick, from and to a share of it.
-    pub(crate) fn parts(&self) -> impl Iterator<Item = [f64; 2]> + use<> {
-        let n = f64::from(self.substeps);
-        (0..self.substeps).map(move |u| [f64::from(u) / n, f64::from(u + 1) / n])
+    /// True where a step begins, and not a further part of one.
+    pub(crate) fn begins_step(&self) -> bool {
+        self.done == 0.0
+    }
+
+    /// The next part, for a body whose longest stable step is now `share` of that at rest; parts of one step are as long as each other
+    /// while that does not change.
+    pub(crate) fn next(&mut self, share: f64) -> Part {
+        let left = 1.0 - self.done;
+        // What is not a number divides nothing.
+        let parts = (left / (BORNE * share).clamp(SHORTEST, 1.0)).ceil().max(1.0);
+        let from = [f64::from(self.step), self.done];
+        (self.step, self.done) =
+            if parts == 1.0 { (self.step + 1, 0.0) } else { (self.step, self.done + left / parts) };
+        let steps = [from[0] + from[1], f64::from(self.step) + self.done];
+        let shares = steps.map(|steps| steps / f64::from(self.substeps));
+        Part { steps, shares, length: left / parts }
     }
 }
 
@@ -60,14 +99,33 @@ impl Stepping {
 mod tests {
     use super::*;
 
-    /// Check that no part of a step is longer than what the body bears, down to a sixteenth of what it bears at rest.
+    /// The parts of a tick of three steps of a body that bears `share` of a step at rest.
+    fn parts(share: impl Fn(f64) -> f64) -> Vec<Part> {
+        let (mut way, mut parts) = (Stepping { tick: 1e-3, substeps: 3 }.through(), Vec::new());
+        while !way.is_over() {
+            let (begins, part) = (way.begins_step(), way.next(share(way.done)));
+            assert_eq!(begins, part.steps[0].fract() == 0.0, "{part:?}");
+            parts.push(part);
+        }
+        parts
+    }
+
+    /// Check that no part of a step is longer than what the body bears, down to a 64th of what it bears at rest, and that all parts
+    /// together are the tick.
     #[test]
     fn steps_are_divided_until_the_body_bears_them() {
-        let stepping = Stepping { tick: 1e-3, substeps: 3 };
-        let parts = |share: f64| stepping.divided(share).substeps / 3;
-        assert_eq!([1.0, 0.96, 0.9, 0.5, 0.19].map(parts), [1, 1, 2, 2, 6]);
-        assert!((7..=100).map(|n| f64::from(n) / 100.0).all(|share| BORNE * share * f64::from(parts(share)) > 0.999));
-        assert_eq!([0.01, 0.0].map(parts), [16; 2]);
-        assert_eq!(parts(f64::NAN), 1);
+        let count = |share: f64| parts(|_| share).len() / 3;
+        assert_eq!([1.0, 0.96, 0.9, 0.5, 0.19].map(count), [1, 1, 2, 2, 6]);
+        assert_eq!([0.01, 0.0].map(count), [64; 2]);
+        assert_eq!(count(f64::NAN), 1);
+        let stiffens = |done: f64| 1.0 - 0.95 * done;
+        for share in [&|_| 1.0, &|_| 0.3, &stiffens, &|_| 0.02] as [&dyn Fn(f64) -> f64; 4] {
+            let parts = parts(share);
+            let borne = |part: &Part| part.length <= BORNE * share(part.steps[0].fract()) + 1e-12;
+            assert!(parts.iter().all(borne), "{parts:?}");
+            assert!(parts.windows(2).all(|pair| (pair[1].steps[0] - pair[0].steps[1]).abs() < 1e-12), "{parts:?}");
+            assert!((parts.iter().map(|part| part.length).sum::<f64>() - 3.0).abs() < 1e-12, "{parts:?}");
+            assert_eq!([parts[0].shares[0], parts[parts.len() - 1].shares[1]], [0.0, 1.0]);
+        }
     }
 }

@@ -91,6 +91,7 @@ impl Simd for Avx2 {
         add(a, b) = _mm256_add_pd;
         sub(a, b) = _mm256_sub_pd;
         mul(a, b) = _mm256_mul_pd;
+        larger(a, b) = _mm256_max_pd;
         mul_add(a, b, c) = _mm256_fmadd_pd;
         mul_sub_from(a, b, c) = _mm256_fnmadd_pd;
     }

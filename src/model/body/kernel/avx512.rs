@@ -98,6 +98,7 @@ impl Simd for Avx512 {
         add(a, b) = _mm512_add_pd;
         sub(a, b) = _mm512_sub_pd;
         mul(a, b) = _mm512_mul_pd;
+        larger(a, b) = _mm512_max_pd;
         mul_add(a, b, c) = _mm512_fmadd_pd;
         mul_sub_from(a, b, c) = _mm512_fnmadd_pd;
     }

@@ -45,6 +45,7 @@ impl Simd for Portable {
         add(a, b) = a + b;
         sub(a, b) = a - b;
         mul(a, b) = a * b;
+        larger(a, b) = if a > b { a } else { b };
         mul_add(a, b, c) = a * b + c;
         mul_sub_from(a, b, c) = c - a * b;
         fused(a, b, c) = a.mul_add(b, c);

@@ -20,10 +20,9 @@ use super::simd::{InstructionSet, Numbers, Simd, Work};
 #[cfg(feature = "parallel")]
 use crate::error::ModelError;
 
-/// By how much the faces of an element have grown in area, squared and in the mean, before its nodes are looked at.
-const FACES: f64 = 1.5;
-/// The same of its edges, to the fourth power, of which the longest count most: viscosity brakes along them.
-const EDGES: f64 = 1.2;
+/// By how much the stable step of an element's nodes may become shorter than that of the body at rest before they are looked at: steps at
+/// rest are 1.3 times shorter than they must be.
+const LOOKED_AT: f64 = 1.2;
 
 /// Evaluates a list of elements.
 #[derive(Clone, Debug)]
@@ -115,12 +114,15 @@ impl TetrahedraKernel {
         });
     }
 
-    /// Calls `found` with the nodes of each element whose faces, or whose edges if it is viscous, had grown beyond what steps at rest have to
-    /// spare in the last evaluation.
+    /// Calls `found` with the nodes of each element that had become so large in the last evaluation, in its faces or, if it is viscous, along
+    /// an axis, that its nodes may not bear the body's steps at rest.
     pub(crate) fn stretched(&self, mut found: impl FnMut([u32; 4])) {
         for part in &self.parts {
-            for (corners, [faces, edges]) in part.corners.iter().zip(&part.stretches) {
-                for lane in (0..LANES).filter(|&lane| faces[lane] > FACES || edges[lane] > EDGES) {
+            if part.largest.iter().all(|&size| size <= 1.0) {
+                continue;
+            }
+            for (corners, sizes) in part.corners.iter().zip(&part.sizes) {
+                for lane in (0..LANES).filter(|&lane| sizes[lane] > 1.0) {
                     found([0, 1, 2, 3].map(|corner| self.order[part.own.start + corners[corner][lane] as usize]));
                 }
             }
@@ -177,10 +179,10 @@ struct Batch {
 struct Resting {
     /// V (m^3).
     volume: Lane,
-    /// Over the sum of the squares of twice the areas of the faces at the first corner (1/m^4).
+    /// Over the largest sum of the squares of twice the areas of the faces that is not looked at (1/m^4).
     inverse_faces: Lane,
-    /// Over the squares of the edges there, and the root of 3 (1/m^2); zero without viscosity.
-    inverse_edges: [Lane; 3],
+    /// B B^T, 11, 22, 33, and twice 12, 13, 23, over the largest tr F^T F that is not looked at (1/m^2); zero without viscosity.
+    metric: [Lane; 6],
 }
 
 /// The elements that belong to a range of nodes, with working memory of their own: what one core does.
@@ -192,9 +194,9 @@ struct Part {
     corners: Vec<Corners>,
     batches: Vec<Batch>,
     resting: Vec<Resting>,
-    /// By how much the elements' faces and edges at their first corner have grown: the mean square of the areas, and the mean of the fourth
-    /// powers of the lengths, over those at rest.
-    stretches: Vec<[Lane; 2]>,
+    /// How large each element is, over what is not looked at, and the largest of each lane.
+    sizes: Vec<Lane>,
+    largest: Lane,
     /// True if an element has a viscosity.
     is_viscous: bool,
     nodes: Vec<Motion>,
@@ -215,7 +217,8 @@ impl Part {
             corners: Vec::new(),
             batches: Vec::new(),
             resting: Vec::new(),
-            stretches: Vec::new(),
+            sizes: Vec::new(),
+            largest: [0.0; LANES],
             is_viscous: elements.iter().any(|(_, element)| element.viscosity != 0.0),
             nodes: vec![Motion::default(); count + 1],
             forces: vec![Push::default(); count + 1],
@@ -225,7 +228,7 @@ impl Part {
         for members in colour(&nodes, count) {
             part.push(&members, &nodes, elements);
         }
-        part.stretches.resize(part.resting.len(), [[0.0; LANES]; 2]);
+        part.sizes.resize(part.resting.len(), [0.0; LANES]);
         part
     }
 
@@ -246,10 +249,15 @@ impl Part {
             batch.offset[lane] = element.shear_modulus / 6.0;
             batch.inverse_volume[lane] = 1.0 / (6.0 * element.volume);
             resting.volume[lane] = element.volume;
-            resting.inverse_faces[lane] = 1.0 / element.faces();
-            let edges = if element.viscosity == 0.0 { [f64::INFINITY; 3] } else { element.edges_squared() };
-            for (inverse, edge) in resting.inverse_edges.iter_mut().zip(edges) {
-                inverse[lane] = 1.0 / (3.0_f64.sqrt() * edge);
+            // What limits a step is the square of an area, or a viscosity times the square of a stretch g, that along one axis of an
+            // element that keeps its volume: tr F^T F = g + 2 / sqrt(g).
+            let stretch = LOOKED_AT * element.spare;
+            resting.inverse_faces[lane] = 1.0 / (stretch * stretch * element.faces());
+            if element.viscosity > 0.0 {
+                let over = 1.0 / (element.volume * (stretch + 2.0 / stretch.sqrt()));
+                for (number, resting) in resting.metric.iter_mut().enumerate() {
+                    resting[lane] = batch.metric[number][lane] * if number < 3 { over } else { 2.0 * over };
+                }
             }
         }
         self.corners.push(corners);
@@ -264,8 +272,8 @@ impl Part {
             node.0 = [x.x, x.y, x.z, 0.0, v.x, v.y, v.z, 0.0];
         }
         self.growth.fill(0.0);
-        let Self { corners, resting, nodes, growth, stretches, .. } = self;
-        set.run(Growth { corners, resting, nodes, growth, stretches });
+        let Self { corners, resting, nodes, growth, sizes, largest, .. } = self;
+        set.run(Growth { corners, resting, nodes, growth, sizes, largest });
         if !is_averaged {
             self.evaluate::<false>(set);
         }
@@ -306,36 +314,41 @@ fn dot<S: Simd>(s: S, a: &[S::V; 3], b: &[S::V; 3]) -> S::V {
     s.fused(a[2], b[2], s.fused(a[1], b[1], s.mul(a[0], b[0])))
 }
 
-/// First of two passes: by how much the volume at each node, for average nodal pressure, and the faces and edges of each element have grown.
+/// First of two passes: by how much the volume at each node has grown, for average nodal pressure, and how large each element is.
 struct Growth<'a> {
     corners: &'a [Corners],
     resting: &'a [Resting],
     nodes: &'a [Motion],
     growth: &'a mut [f64],
-    stretches: &'a mut [[Lane; 2]],
+    sizes: &'a mut [Lane],
+    largest: &'a mut Lane,
 }
 
 impl Work for Growth<'_> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        let Self { corners, resting, nodes, growth, stretches } = self;
-        let sixth = s.splat(1.0 / 6.0);
-        for ((corners, resting), [grown_faces, grown_edges]) in corners.iter().zip(resting).zip(stretches) {
+        let Self { corners, resting, nodes, growth, sizes, largest } = self;
+        let (sixth, mut most) = (s.splat(1.0 / 6.0), s.splat(0.0));
+        for ((corners, resting), size) in corners.iter().zip(resting).zip(sizes) {
             let [[x1, y1, z1, _], _] = s.differences(nodes, &corners[0], &corners[1]);
             let [[x2, y2, z2, _], _] = s.differences(nodes, &corners[0], &corners[2]);
             let [[x3, y3, z3, _], _] = s.differences(nodes, &corners[0], &corners[3]);
             let (d1, d2, d3) = ([x1, y1, z1], [x2, y2, z2], [x3, y3, z3]);
             let (c1, c2, c3) = (cross(s, &d2, &d3), cross(s, &d3, &d1), cross(s, &d1, &d2));
-            let faces = s.add(s.add(dot(s, &c1, &c1), dot(s, &c2, &c2)), dot(s, &c3, &c3));
-            s.store(s.mul(faces, s.load(&resting.inverse_faces)), grown_faces);
-            let [i1, i2, i3] = &resting.inverse_edges;
-            // Closures would not be compiled for the instruction set.
-            let edges = [
-                s.mul(dot(s, &d1, &d1), s.load(i1)),
-                s.mul(dot(s, &d2, &d2), s.load(i2)),
-                s.mul(dot(s, &d3, &d3), s.load(i3)),
-            ];
-            s.store(dot(s, &edges, &edges), grown_edges);
+            // The fourth face is their sum.
+            let mut c0 = c1;
+            for axis in 0..3 {
+                c0[axis] = s.add(s.add(c1[axis], c2[axis]), c3[axis]);
+            }
+            let faces = s.add(s.add(dot(s, &c1, &c1), dot(s, &c2, &c2)), s.add(dot(s, &c3, &c3), dot(s, &c0, &c0)));
+            let [m11, m22, m33, m12, m13, m23] = &resting.metric;
+            let squares = [dot(s, &d1, &d1), dot(s, &d2, &d2), dot(s, &d3, &d3)];
+            let products = [dot(s, &d1, &d2), dot(s, &d1, &d3), dot(s, &d2, &d3)];
+            let squares = dot(s, &squares, &[s.load(m11), s.load(m22), s.load(m33)]);
+            let products = dot(s, &products, &[s.load(m12), s.load(m13), s.load(m23)]);
+            let grown = s.larger(s.mul(faces, s.load(&resting.inverse_faces)), s.add(squares, products));
+            s.store(grown, size);
+            most = s.larger(grown, most);
             let mut grown = [0.0; LANES];
             s.store(s.sub(s.mul(dot(s, &d1, &c1), sixth), s.load(&resting.volume)), &mut grown);
             for corner in corners {
@@ -344,6 +357,7 @@ impl Work for Growth<'_> {
                 }
             }
         }
+        s.store(most, largest);
     }
 }
 

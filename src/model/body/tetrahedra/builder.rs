@@ -94,11 +94,12 @@ impl TetrahedraBuilder {
         let mut inverse_masses = inverse(masses);
         inverse_masses.iter_mut().zip(is_held).filter(|(_, is_held)| *is_held).for_each(|(w, _)| *w = 0.0);
         let inverse_volumes = self.nodal_pressure.then(|| inverse(volumes));
-        let kernel = TetrahedraKernel::new(nodes, &elements, inverse_volumes.as_deref());
-        let solid = Solid::new(nodes, elements, inverse_volumes);
+        let mut solid = Solid::new(nodes, elements, inverse_volumes);
+        let stiffening = Stiffening::new(&mut solid, &inverse_masses, &mesh.points);
+        let kernel = TetrahedraKernel::new(nodes, &solid.elements, solid.inverse_volumes.as_deref());
         let mut body = Tetrahedra {
             surface: Surface::new(nodes, mesh.surface_triangles()).map_err(|error| error.at("mesh"))?,
-            stiffening: Stiffening::new(&solid, &inverse_masses, &mesh.points),
+            stiffening,
             kernel,
             solid,
             volume: quality.volume,
@@ -123,6 +124,7 @@ fn element(mesh: &TetrahedralMesh, nodes: [u32; 4], tissue: &Tissue) -> Element 
         shear_modulus: tissue.shear_modulus(),
         bulk: tissue.lame() + tissue.shear_modulus(),
         viscosity: tissue.viscosity,
+        spare: 1.0,
     }
 }
 

@@ -18,6 +18,8 @@ pub(crate) struct Element {
     pub(crate) bulk: f64,
     /// eta (Pa s).
     pub(crate) viscosity: f64,
+    /// By how much the longest stable step of each of its nodes is longer at rest than that of the body, at least.
+    pub(crate) spare: f64,
 }
 
 /// An element in a state: its edges and their rates in columns, and the gradient of six volumes by the three edges.
@@ -54,16 +56,10 @@ impl Element {
         self.inverse * self.inverse.transpose() * self.volume
     }
 
-    /// The sum of the squares of twice the areas of the faces at node 0 at rest (m^4).
+    /// The sum of the squares of twice the areas of the faces at rest (m^4).
     pub(crate) fn faces(&self) -> f64 {
         // cof D = det D D^-T.
-        (6.0 * self.volume).powi(2) * self.inverse.norm_squared()
-    }
-
-    /// The squares of the edges from node 0 at rest (m^2).
-    pub(crate) fn edges_squared(&self) -> [f64; 3] {
-        let edges = self.inverse.try_inverse().unwrap_or_default();
-        [0, 1, 2].map(|corner| edges.column(corner).norm_squared())
+        (6.0 * self.volume).powi(2) * (self.inverse.norm_squared() + self.inverse.row_sum().norm_squared())
     }
 
     /// The gradient of the shape function of `node` at rest (1/m).

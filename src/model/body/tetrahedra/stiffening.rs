@@ -33,12 +33,16 @@ pub(super) struct Stiffening {
 }
 
 impl Stiffening {
-    /// Of a body at rest.
-    pub(super) fn new(solid: &Solid, inverse_masses: &[f64], rest: &[Vec3]) -> Self {
+    /// Of a body at rest, whose elements learn what they have to spare.
+    pub(super) fn new(solid: &mut Solid, inverse_masses: &[f64], rest: &[Vec3]) -> Self {
         let mut new = Self::with(f64::INFINITY, rest.len());
         let (state, nodes) = (State::at_rest(rest), 0..rest.len() as u32);
-        let steps = nodes.map(|node| new.stable_step(solid, inverse_masses, &state, node));
-        new.at_rest = steps.fold(f64::INFINITY, f64::min);
+        let steps: Vec<f64> = nodes.map(|node| new.stable_step(solid, inverse_masses, &state, node)).collect();
+        new.at_rest = steps.iter().copied().fold(f64::INFINITY, f64::min);
+        for element in &mut solid.elements {
+            let longest = element.nodes.map(|node| steps[node as usize]).into_iter().fold(f64::INFINITY, f64::min);
+            element.spare = longest / new.at_rest;
+        }
         new
     }
 

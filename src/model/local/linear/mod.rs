@@ -9,6 +9,7 @@ use super::patch::{Patch, Window};
 use super::{Kind, LocalModel, ResyncView};
 use crate::contact::{Contact, ContactPoint, Equations, ToolMotion, step_implicit};
 use crate::linear::{Drift, ImplicitStep, PatchTangent};
+use crate::simulation::Part;
 use crate::{Vec3, Wrench};
 
 pub(super) use boundary::{Boundary, Layers, Yielding};
@@ -62,21 +63,23 @@ impl LinearPatch {
         Drift { time: ticks * self.patch.stepping.tick + if is_moving { t } else { 0.0 }, is_moving }
     }
 
-    /// One step from `t` seconds into the present tick, each tool along `motion` of its number.
-    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, t: f64, d: f64) {
+    /// One step, the `part` of the present tick, in which each tool goes its way.
+    fn step(&mut self, tools: &[ToolMotion], part: Part) {
+        let (d, [from, to]) = (self.patch.stepping.step(), part.shares);
+        let motion = |tool: usize| tools[tool].part(from, to);
         // An implicit step takes its forces at its end.
         let ahead = if self.is_implicit { d } else { 0.0 };
-        let drift = self.drift(t + ahead);
+        let drift = self.drift(part.steps[0] * d + ahead);
         let Self { patch, system, tangent, .. } = self;
         let movable = patch.window.movable;
         let (x, v) = (&patch.state.positions[..movable], &patch.state.velocities[..movable]);
         tangent.forces(x, v, ahead, drift, &mut patch.forces);
         if self.is_implicit {
-            patch.with_contact(|body, forces, (touches, numbers, rows), law| {
+            patch.with_contact(part.length, |body, forces, (touches, numbers, rows), law| {
                 step_implicit(body, system, forces, touches, rows, law, |tool| motion(numbers[tool]));
             });
         } else {
-            patch.step(motion, d);
+            patch.step(motion, part.length);
         }
     }
 
@@ -130,19 +133,18 @@ impl LocalModel for LinearPatch {
     fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
         let ends = |tool: usize| tools[tool].to;
         if self.patch.is_left() {
-            return self.patch.feel(ends, 1);
+            return self.patch.feel(ends);
         }
-        let (stepping, mut t) = (self.patch.stepping, 0.0);
+        let mut way = self.patch.stepping.through();
         self.patch.tools.begin(tools);
-        for [from, to] in stepping.parts() {
-            self.step(|tool| tools[tool].part(from, to), t, stepping.step());
-            t += stepping.step();
+        while !way.is_over() {
+            self.step(tools, way.next(1.0));
         }
         self.ticks = self.ticks.saturating_add(1);
         if self.ticks == self.boundary.moving_ticks() {
             self.hold_rim();
         }
-        self.patch.feel(ends, stepping.substeps)
+        self.patch.feel(ends)
     }
 
     fn built_at(&self) -> u64 {

@@ -53,7 +53,7 @@ impl Feeling {
         (from - self.at).norm() > PUT
     }
 
-    /// A step is over in which it felt `wrench`.
+    /// A step is over in which it felt `wrench`, or a part of it: its share.
     pub(super) fn add(&mut self, wrench: Wrench) {
         self.sum += wrench;
     }

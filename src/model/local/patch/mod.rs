@@ -72,27 +72,29 @@ impl Patch {
         self.tools.feeling(tool).map(Feeling::felt)
     }
 
-    /// A tick of `steps` steps is over, at whose end the tool of each number is at a pose of `end`; what its own feels.
-    pub(super) fn feel(&mut self, end: impl Fn(usize) -> Pose, steps: u32) -> Wrench {
+    /// A tick is over, at whose end the tool of each number is at a pose of `end`; what its own feels.
+    pub(super) fn feel(&mut self, end: impl Fn(usize) -> Pose) -> Wrench {
         // A state that is not finite touches nothing: its zero force would look like a free tool.
         if self.state.is_finite() {
-            self.tools.end_tick(end, steps, (&self.window, &self.rest), &self.law.friction);
+            self.tools.end_tick(end, self.stepping, (&self.window, &self.rest), &self.law.friction);
         } else {
             self.tools.spoil();
         }
         self.wrench(self.own).unwrap_or_default()
     }
 
-    /// One explicit step of `d` seconds under the forces and the tools', each of which moves along `motion` of its number.
-    pub(super) fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64) {
-        self.with_contact(|body, forces, (touches, numbers, rows), law| {
+    /// One explicit step, or a part of it of that `length`, under the forces and the tools', each of which moves along `motion` of its number.
+    pub(super) fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, length: f64) {
+        let d = self.stepping.step() * length;
+        self.with_contact(length, |body, forces, (touches, numbers, rows), law| {
             step_all(body, forces, touches, rows, law, |tool| motion(numbers[tool]), d);
         })
     }
 
-    /// Does `step` with the patch, its forces, the tools on it with their numbers, and its law.
+    /// Does `step`, or a part of it of that `length`, with the patch, its forces, the tools on it with their numbers, and its law.
     pub(super) fn with_contact(
         &mut self,
+        length: f64,
         step: impl FnOnce(&mut Deformable<'_>, &[Vec3], (&mut [Touch], &[usize], &mut Rows), &Law),
     ) {
         self.tools.add_beside(&self.window, &mut self.forces);
@@ -104,7 +106,7 @@ impl Patch {
             candidates: &self.window.candidates,
         };
         step(&mut deformable, &self.forces, self.tools.present(), &self.law);
-        self.tools.end_step(&self.window, &self.rest);
+        self.tools.end_step(length, &self.window, &self.rest);
     }
 
     /// The contact of tool number `tool` in the body's numbering.

@@ -6,6 +6,7 @@ use super::super::ResyncView;
 use super::feeling::Feeling;
 use super::window::Window;
 use crate::contact::{Contact, Friction, Rows, ToolMotion, Touch};
+use crate::simulation::Stepping;
 use crate::{Pose, Vec3};
 
 /// The tools that are resolved together on a patch, and what those exert that are not.
@@ -126,12 +127,13 @@ impl Tools {
         }
     }
 
-    /// A step is over. Those that press on nodes that give way in the body, but not here, go on as they pressed last.
-    pub(super) fn end_step(&mut self, window: &Window, rest: &[Vec3]) {
+    /// A step is over, or a part of it of that `length`. Those that press on nodes that give way in the body, but not here, go on as they
+    /// pressed last.
+    pub(super) fn end_step(&mut self, length: f64, window: &Window, rest: &[Vec3]) {
         self.feelings
             .iter_mut()
             .zip(&self.touches[..self.present])
-            .for_each(|(feeling, touch)| feeling.add(touch.wrench));
+            .for_each(|(feeling, touch)| feeling.add(touch.wrench * length));
         while let Some(gone) = (0..self.present).find(|&tool| window.has_left(&self.touches[tool])) {
             self.feelings[gone].stray(&self.touches[gone], (&window.surface, rest));
             self.present -= 1;
@@ -142,11 +144,11 @@ impl Tools {
         }
     }
 
-    /// A tick of `steps` steps is over, at whose end the tool of each number is at a pose of `end`.
+    /// A tick of such steps is over, at whose end the tool of each number is at a pose of `end`.
     pub(super) fn end_tick(
         &mut self,
         end: impl Fn(usize) -> Pose,
-        steps: u32,
+        stepping: Stepping,
         (window, rest): (&Window, &[Vec3]),
         friction: &Friction,
     ) {
@@ -156,8 +158,8 @@ impl Tools {
             if feeling.is_beyond() {
                 feeling.follow(&pose, touch, friction);
             } else {
-                touch.end(steps, id);
-                feeling.end(&pose, steps, touch, (&window.surface, rest));
+                touch.end(stepping.tick, id);
+                feeling.end(&pose, stepping.substeps, touch, (&window.surface, rest));
             }
         }
     }

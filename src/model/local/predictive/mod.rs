@@ -8,6 +8,7 @@ use self::ring::{NearBody, RingPath};
 use super::patch::{Patch, Window};
 use super::{Kind, LocalModel, ResyncView};
 use crate::contact::{Contact, ContactPoint, ToolMotion};
+use crate::simulation::Part;
 use crate::surroundings::{Basis, ReducedMotion};
 use crate::{Vec3, Wrench};
 
@@ -177,17 +178,17 @@ impl Predictive {
         self.near.forces(state, forces);
     }
 
-    /// A step of `d` seconds by the near forces at its start, each tool along `motion` of its number; the path is sampled `from` and `to`
-    /// so many substeps after the tick's start.
-    fn step(&mut self, motion: impl Fn(usize) -> ToolMotion, d: f64, [from, to]: [f64; 2]) {
-        self.patch.step(motion, d);
-        let start = self.substep as f64;
+    /// A `part` of a tick by the near forces at its start, in which each tool goes its way.
+    fn step(&mut self, tools: &[ToolMotion], part: Part) {
+        let Part { steps, shares: [from, to], length } = part;
+        self.patch.step(|tool| tools[tool].part(from, to), length);
+        let [from, to] = steps.map(|step| self.substep as f64 + step);
         if let Some(basis) = &self.basis {
-            self.path.at(start + from).write_forces(&mut self.ring_forces);
+            self.path.at(from).write_forces(&mut self.ring_forces);
             deviations(&mut self.ring_forces, &self.patch.forces[self.patch.window.movable..]);
-            basis.answers.step(&mut self.surroundings, &self.ring_forces, d);
+            basis.answers.step(&mut self.surroundings, &self.ring_forces, self.patch.stepping.step() * length);
         }
-        self.path.at(start + to).write(&mut self.ring_positions, &mut self.ring_velocities);
+        self.path.at(to).write(&mut self.ring_positions, &mut self.ring_velocities);
         self.surroundings.add_ring(&mut self.ring_positions, &mut self.ring_velocities);
         self.place_ring();
     }
@@ -224,22 +225,17 @@ impl LocalModel for Predictive {
     fn tick(&mut self, tools: &[ToolMotion]) -> Wrench {
         let ends = |tool: usize| tools[tool].to;
         if self.patch.is_left() {
-            return self.patch.feel(ends, 1);
+            return self.patch.feel(ends);
         }
-        let stepping = self.patch.stepping;
-        self.take_near_forces();
-        let divided = stepping.divided(self.near.stable_share());
-        let substeps = f64::from(stepping.substeps);
         self.patch.tools.begin(tools);
-        for [from, to] in divided.parts() {
-            if from > 0.0 {
-                self.take_near_forces();
-            }
-            let on_path = [from * substeps, to * substeps];
-            self.step(|tool| tools[tool].part(from, to), divided.step(), on_path);
+        let mut way = self.patch.stepping.through();
+        while !way.is_over() {
+            self.take_near_forces();
+            let part = way.next(self.near.stable_share());
+            self.step(tools, part);
         }
-        self.substep += stepping.substeps as usize;
-        self.patch.feel(ends, divided.substeps)
+        self.substep += self.patch.stepping.substeps as usize;
+        self.patch.feel(ends)
     }
 
     fn built_at(&self) -> u64 {

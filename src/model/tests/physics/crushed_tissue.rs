@@ -1,9 +1,9 @@
 //! Tissue that is crushed becomes too stiff for steps that are stable at rest.
 
-use crate::tissue_support::{Noise, slab, slab_of};
-use crate::tool_support::{crush, down, resting};
+use crate::tissue_support::{Noise, body, organ, slab, slab_of};
+use crate::tool_support::{crush, down, on_top, resting, resting_in};
 use palpate_model::Vec3;
-use palpate_model::body::{Body, State, TangentBlock, Tetrahedra};
+use palpate_model::body::{Body, State, TangentBlock, Tetrahedra, Tissue};
 use palpate_model::contact::{ToolMotion, ToolShape};
 use palpate_model::integrator::Spectrum;
 use palpate_model::local::{Kind, ResyncView, Template, ToolForecast};
@@ -167,4 +167,28 @@ fn furthest_off(taken_over: u32, holds_all: bool) -> f64 {
         if off.is_finite() { off } else { f64::INFINITY }
     });
     off.fold(0.0, f64::max)
+}
+
+/// Check that an organ holds together that a tool crosses faster than a hand, and that the tool feels what it does in steps of a quarter:
+/// what the elements bear changes within a tick, and those that are drawn out need not be so along the edges of their first corner.
+#[test]
+fn an_organ_that_a_tool_crosses_holds_together() {
+    for (poisson_ratio, viscosity, is_averaged, speed) in [(0.3, 8.0, true, 0.8), (0.3, 3.1, false, 1.3)] {
+        for radius in [0.0, 0.004] {
+            let tissue = Tissue { young_modulus: 3e3, poisson_ratio, density: 1060.0, viscosity };
+            let shape = if radius == 0.0 { ToolShape::Point } else { ToolShape::Sphere { radius } };
+            let [felt, expected] = [1, 4].map(|times| {
+                let body = body(organ(), tissue, is_averaged);
+                let top = on_top(&body, Vec3::new(0.01, 0.003, 0.0)).0[2].1;
+                let mut simulation = resting_in(Box::new(body), shape, times);
+                let at = |tick: u32| top + Vec3::z() * (radius + 1e-3 - speed * 1e-3 * f64::from(tick));
+                (0..(1.5e3 * top.z / speed) as u32).fold(0.0, |peak: f64, tick| {
+                    let force = simulation.tick(ToolMotion::straight(at(tick), at(tick + 1))).force.norm();
+                    if force.is_finite() { peak.max(force) } else { f64::INFINITY }
+                })
+            });
+            println!("{viscosity} Pa s, {radius} m: {felt:.3} of {expected:.3} N");
+            assert!((felt / expected - 1.0).abs() < 0.25, "{viscosity} Pa s, {radius} m: {felt} of {expected} N");
+        }
+    }
 }
