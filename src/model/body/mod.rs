@@ -199,7 +199,7 @@ pub trait Body: Send + Sync + std::fmt::Debug {
     /// most 1: steps are divided where a body that is crushed has become too stiff for them. The default is 1: springs do not stiffen.
     ///
     /// # Real-time
-    /// Called once per haptic tick: bounded, must not allocate or block.
+    /// Called at steps of a haptic tick: bounded, must not allocate or block.
     fn stable_share(&mut self, _state: &State) -> f64 {
         1.0
     }

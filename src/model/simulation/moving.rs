@@ -39,7 +39,7 @@ impl Moving {
             if way.begins_step() {
                 watch(state);
             }
-            let Part { shares: [from, to], length, .. } = way.next(body.stable_share(state));
+            let Part { shares: [from, to], length, .. } = way.next(|| body.stable_share(state));
             let mut deformable = Deformable {
                 positions: &mut state.positions,
                 velocities: &mut state.velocities,

@@ -138,7 +138,7 @@ impl LocalModel for LinearPatch {
         let mut way = self.patch.stepping.through();
         self.patch.tools.begin(tools);
         while !way.is_over() {
-            self.step(tools, way.next(1.0));
+            self.step(tools, way.next(|| 1.0));
         }
         self.ticks = self.ticks.saturating_add(1);
         if self.ticks == self.boundary.moving_ticks() {

@@ -231,7 +231,7 @@ impl LocalModel for Predictive {
         let mut way = self.patch.stepping.through();
         while !way.is_over() {
             self.take_near_forces();
-            let part = way.next(self.near.stable_share());
+            let part = way.next(|| self.near.stable_share());
             self.step(tools, part);
         }
         self.substep += self.patch.stepping.substeps as usize;
