@@ -33,13 +33,13 @@ impl Moving {
         assert!((1..=*stride).contains(&ticks), "{ticks} ticks in steps of at most {stride}");
         means.fill(Wrench::default());
         touches.iter_mut().for_each(Touch::begin);
-        let (mut way, step) = (stepping.through(), f64::from(ticks) * stepping.step());
-        while !way.is_over() {
+        let (mut progress, step) = (stepping.begin(), f64::from(ticks) * stepping.step());
+        while !progress.is_over() {
             body.forces(state, forces);
-            if way.begins_step() {
+            if progress.begins_step() {
                 watch(state);
             }
-            let Part { shares: [from, to], length, .. } = way.next(|| body.stable_share(state));
+            let Part { shares: [from, to], length, .. } = progress.next(|| body.stable_share(state));
             let mut deformable = Deformable {
                 positions: &mut state.positions,
                 velocities: &mut state.velocities,

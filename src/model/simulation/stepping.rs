@@ -44,16 +44,16 @@ impl Stepping {
         self.tick / f64::from(self.substeps)
     }
 
-    /// The way through one tick.
-    pub(crate) fn through(&self) -> Through {
+    /// A tick begins.
+    pub(crate) fn begin(&self) -> TickProgress {
         let every = (FOUND_EVERY / self.step()).clamp(1.0, f64::from(u32::MAX)) as u32;
-        Through { substeps: self.substeps, step: 0, done: 0.0, every, share: 0.0 }
+        TickProgress { substeps: self.substeps, step: 0, done: 0.0, every, share: 0.0 }
     }
 }
 
-/// The way through a tick, step by step, each of them in parts that the body bears.
+/// How far a tick has come: step by step, each of them in parts that the body bears.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Through {
+pub(crate) struct TickProgress {
     substeps: u32,
     /// Steps that are over.
     step: u32,
@@ -76,7 +76,7 @@ pub(crate) struct Part {
     pub(crate) length: f64,
 }
 
-impl Through {
+impl TickProgress {
     /// True once the tick is over.
     pub(crate) fn is_over(&self) -> bool {
         self.step == self.substeps
@@ -111,10 +111,10 @@ mod tests {
 
     /// The parts of a tick of three steps of a body that bears `share` of a step at rest.
     fn parts(share: impl Fn(f64) -> f64) -> Vec<Part> {
-        let (mut way, mut parts) = (Stepping { tick: 1e-3, substeps: 3 }.through(), Vec::new());
-        while !way.is_over() {
-            let (begins, done) = (way.begins_step(), way.done);
-            let part = way.next(|| share(done));
+        let (mut progress, mut parts) = (Stepping { tick: 1e-3, substeps: 3 }.begin(), Vec::new());
+        while !progress.is_over() {
+            let (begins, done) = (progress.begins_step(), progress.done);
+            let part = progress.next(|| share(done));
             assert_eq!(begins, part.steps[0].fract() == 0.0, "{part:?}");
             parts.push(part);
         }

@@ -11,6 +11,7 @@ mod avx2;
 mod avx512;
 mod colouring;
 mod cores;
+mod growth;
 mod lattice;
 mod network;
 mod nodes;

@@ -135,10 +135,10 @@ impl LocalModel for LinearPatch {
         if self.patch.is_left() {
             return self.patch.feel(ends);
         }
-        let mut way = self.patch.stepping.through();
+        let mut progress = self.patch.stepping.begin();
         self.patch.tools.begin(tools);
-        while !way.is_over() {
-            self.step(tools, way.next(|| 1.0));
+        while !progress.is_over() {
+            self.step(tools, progress.next(|| 1.0));
         }
         self.ticks = self.ticks.saturating_add(1);
         if self.ticks == self.boundary.moving_ticks() {

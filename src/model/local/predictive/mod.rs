@@ -228,10 +228,10 @@ impl LocalModel for Predictive {
             return self.patch.feel(ends);
         }
         self.patch.tools.begin(tools);
-        let mut way = self.patch.stepping.through();
-        while !way.is_over() {
+        let mut progress = self.patch.stepping.begin();
+        while !progress.is_over() {
             self.take_near_forces();
-            let part = way.next(|| self.near.stable_share());
+            let part = progress.next(|| self.near.stable_share());
             self.step(tools, part);
         }
         self.substep += self.patch.stepping.substeps as usize;
