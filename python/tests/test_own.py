@@ -209,4 +209,8 @@ def test_a_body_that_explodes_is_a_fault_with_what_came_before():
         palpate.Session(Explodes(), path=DOWN, model="full").run()
     run = caught.value.run
     assert run.faults and str(caught.value).endswith(run.faults[0])
-    assert 50 < len(run) < 200 and run.force[:, 2].max() > 0.01
+    assert 50 < len(run) < 200
+    # The record has what was computed in the tick of the fault; the device never gets it.
+    before, last = run.force[:-1], run.force[-1]
+    assert np.isfinite(before).all() and before[:, 2].max() > 0.01 and np.isnan(last).any()
+    assert np.isfinite(run.commanded).all()
