@@ -30,11 +30,14 @@ def linked(page):
 
 
 def crates():
-    """(name, description) of each library of the workspace."""
+    """(name, description) of each library that `cargo doc` documents: of the workspace's default members."""
     text = subprocess.run(
         ["cargo", "metadata", "--format-version", "1", "--no-deps", "--locked"], cwd=ROOT, check=True, capture_output=True, text=True
     ).stdout
-    for package in json.loads(text)["packages"]:
+    workspace = json.loads(text)
+    for package in workspace["packages"]:
+        if package["id"] not in workspace["workspace_default_members"]:
+            continue
         for target in package["targets"]:
             if "lib" in target["kind"]:
                 yield target["name"], package["description"] or ""
