@@ -85,39 +85,32 @@ impl Exact {
                 _ => {}
             }
         }
-        MORE.into_iter().any(|more| {
-            self.fill(rows, nearness, answers, closing, d);
+        for more in MORE {
+            self.matrix.clear();
+            self.right.clear();
+            for one in &self.unknowns {
+                let row = &rows[one.place];
+                let allowed =
+                    if one.presses { row.allowed + row.sunk.at(nearness.load(one.place) / d) / d } else { 0.0 };
+                self.right.push(one.test.dot(&closing[one.place]) - allowed);
+                for other in &self.unknowns {
+                    let mut answer = one.test.dot(&(answers.get(other.place, one.place) * other.push));
+                    if one.presses && other.presses {
+                        answer += row.sunk.slope / (d * d) * nearness.share(other.place, one.place);
+                    }
+                    self.matrix.push(answer);
+                }
+            }
             let fastest = rows.iter().map(|row| row.closing.norm());
             let fastest = self.right.iter().map(|right| right.abs()).chain(fastest).fold(0.0, f64::max);
             let is_slow =
                 |(unknown, change): (&Unknown, &f64)| (change * rows[unknown.place].compliance).abs() <= MOST * fastest;
-            eliminate(&mut self.matrix, &mut self.right, more) && self.unknowns.iter().zip(&self.right).all(is_slow)
-        })
-    }
-
-    /// Writes the system of the unknowns.
-    fn fill<C: Copy + Default + Mul<Vec3, Output = Vec3>>(
-        &mut self,
-        rows: &[Row],
-        nearness: &Nearness,
-        answers: &Columns<C>,
-        closing: &[Vec3],
-        d: f64,
-    ) {
-        self.matrix.clear();
-        self.right.clear();
-        for one in &self.unknowns {
-            let row = &rows[one.place];
-            let allowed = if one.presses { row.allowed + row.sunk.at(nearness.load(one.place) / d) / d } else { 0.0 };
-            self.right.push(one.test.dot(&closing[one.place]) - allowed);
-            for other in &self.unknowns {
-                let mut answer = one.test.dot(&(answers.get(other.place, one.place) * other.push));
-                if one.presses && other.presses {
-                    answer += row.sunk.slope / (d * d) * nearness.share(other.place, one.place);
-                }
-                self.matrix.push(answer);
+            if eliminate(&mut self.matrix, &mut self.right, more) && self.unknowns.iter().zip(&self.right).all(is_slow)
+            {
+                return true;
             }
         }
+        false
     }
 
     /// How many changes were found.
