@@ -27,12 +27,11 @@ impl Corners {
     }
 
     /// Calls `keep` for each corner that would overlap with a tool whose axis is there; none where elements are coarse. Corners are pushed so much
-    /// farther than the tool's surface that the triangles between them, which are chords, lie on it in the mean. `at` gives the place (m)
-    /// of a corner of the `vicinity` at the end of the step if nothing presses.
+    /// farther than the tool's surface that the triangles between them, which are chords, lie on it in the mean. `corners` are those of the
+    /// `vicinity` at the start of the step and at its end if nothing presses (m), `squares` how far they are from the axis then, squared.
     pub(super) fn find(
         &mut self,
-        vicinity: &Vicinity,
-        at: impl Fn(u32) -> Vec3,
+        (vicinity, corners, squares): (&Vicinity, &[[Vec3; 2]], &[f64]),
         touch: &Touch,
         axis: &[Vec3; 2],
         mut keep: impl FnMut(Near),
@@ -43,12 +42,19 @@ impl Corners {
         if fine == 0.0 {
             return;
         }
+        for ((is_met, &node), squared) in self.is_met.iter_mut().zip(&vicinity.nodes).zip(squares) {
+            *is_met = squared.sqrt() < radius + beyond(touch, node as usize);
+        }
         self.outward.clear();
         self.outward.resize(vicinity.nodes.len(), Vec3::zeros());
         for places in &vicinity.corners {
-            let [a, b, c] = places.map(&at);
-            let across = (b - a).cross(&(c - a));
-            places.iter().for_each(|&place| self.outward[place as usize] += across);
+            let [a, b, c] = places.map(|place| place as usize);
+            if !(self.is_met[a] || self.is_met[b] || self.is_met[c]) {
+                continue;
+            }
+            let (first, second) = (corners[b][1] - corners[a][1], corners[c][1] - corners[a][1]);
+            let across = first.cross(&second);
+            [a, b, c].into_iter().for_each(|place| self.outward[place] += across);
         }
         // A vicinity numbers its nodes in the order in which its triangles name them.
         let mut next = 0;
@@ -58,11 +64,14 @@ impl Corners {
                     continue;
                 }
                 next += 1;
-                let place = at(number);
+                let number = number as usize;
+                if !std::mem::take(&mut self.is_met[number]) {
+                    continue;
+                }
+                let place = corners[number][1];
                 let share = closest::share_at(axis, &place);
                 let away = axis[0] + (axis[1] - axis[0]) * share - place;
-                let (number, node) = (number as usize, vicinity.nodes[number as usize] as usize);
-                let gap = away.norm() - radius - beyond(touch, node);
+                let gap = away.norm() - radius - beyond(touch, vicinity.nodes[number] as usize);
                 if gap >= 0.0 || away.dot(&self.outward[number]) <= 0.0 {
                     continue;
                 }
@@ -72,6 +81,11 @@ impl Corners {
                 keep(Near { triangle, weights, place, normal, gap, share });
             }
         }
+    }
+
+    /// True if all three corners are met.
+    pub(super) fn are_all_met(&self, places: &[u32; 3]) -> bool {
+        places.iter().all(|place| self.is_met[*place as usize])
     }
 
     /// True if all corners with a weight are met: what is between them cannot overlap by more than a chord.

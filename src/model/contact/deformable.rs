@@ -43,7 +43,6 @@ impl Deformable<'_> {
         if corner.is_empty() || fine == 1.0 {
             return [x, x + v * ahead];
         }
-        // The sum over `Skin::shares`: that iterator is too slow for a sum over every corner in every step.
         let [mean_x, mean_v] = corner.iter().fold([Vec3::zeros(); 2], |[x, v], &(other, share)| {
             [x + self.positions[other as usize] * share, v + self.velocities[other as usize] * share]
         });

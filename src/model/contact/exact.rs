@@ -52,13 +52,12 @@ impl Default for Exact {
 impl Exact {
     /// The changes of the impulses (N s), place after place, after which `rows` close as their modes demand. Directions of sliding stay
     /// what they are. `false` if there is no such change, or too many unknowns. `answers` and `closing` are those of the sweeps.
-    pub(super) fn solve<C: Copy + Default + Mul<Vec3, Output = Vec3>>(
+    pub(super) fn solve<C: Copy + Default + PartialEq + Mul<Vec3, Output = Vec3>>(
         &mut self,
         rows: &[Row],
         nearness: &Nearness,
         answers: &Columns<C>,
         closing: &[Vec3],
-        d: f64,
     ) -> bool {
         self.unknowns.clear();
         for (place, row) in rows.iter().enumerate() {
@@ -90,13 +89,12 @@ impl Exact {
             self.right.clear();
             for one in &self.unknowns {
                 let row = &rows[one.place];
-                let allowed =
-                    if one.presses { row.allowed + row.sunk.at(nearness.load(one.place) / d) / d } else { 0.0 };
+                let allowed = if one.presses { row.allowed + row.sunk.at(nearness.load(one.place)) } else { 0.0 };
                 self.right.push(one.test.dot(&closing[one.place]) - allowed);
                 for other in &self.unknowns {
                     let mut answer = one.test.dot(&(answers.get(other.place, one.place) * other.push));
                     if one.presses && other.presses {
-                        answer += row.sunk.slope / (d * d) * nearness.share(other.place, one.place);
+                        answer += row.sunk.slope * nearness.share(other.place, one.place);
                     }
                     self.matrix.push(answer);
                 }
@@ -208,9 +206,11 @@ mod tests {
         nearness.find(&rows);
         answers.begin(2);
         for place in 0..2 {
-            answers.of(place, |column| (0..2).for_each(|at| column[at] = if at == place { 1.0 } else { 1.0 - 1e-7 }));
+            let find =
+                |column: &mut [f64]| (0..2).for_each(|at| column[at] = if at == place { 1.0 } else { 1.0 - 1e-7 });
+            assert_eq!(answers.of(place, find).count(), 2);
         }
-        assert!(exact.solve(&rows, &nearness, &answers, &rows.map(|row| row.closing), 1e-3));
+        assert!(exact.solve(&rows, &nearness, &answers, &rows.map(|row| row.closing)));
         let mut sums = [Vec3::zeros(); 2];
         for (place, change) in (0..exact.unknowns()).map(|unknown| exact.change(unknown)) {
             sums[place] += change;

@@ -53,14 +53,17 @@ impl Grain {
         let hertz = (9.0 / (16.0 * radius * self.modulus * self.modulus)).cbrt();
         // The elements lack most where they show the share s of the depth, 2 - 3 s - 4 c s^2 = 0.
         let at_turn = ((9.0 + 32.0 * CRUSHED).sqrt() - 3.0) / (8.0 * CRUSHED);
-        let turn = (at_turn * hertz / shown).powi(3);
+        let root = at_turn * hertz / shown;
+        let turn = root.powi(3);
         // A stranger's stiffness may be beyond every body: nothing is known of what the elements lack.
         if ![shown, hertz, turn].iter().all(|figure| figure.is_finite()) {
-            return Sinking { shown: 0.0, hertz: 0.0, turn: 0.0, share: 0.0, most: self.most };
+            return Sinking { shown: 0.0, hertz: 0.0, turn: 0.0, share: 0.0, limit: self.most, most: 0.0 };
         }
-        let whole = Sinking { shown, hertz, turn, share: 1.0, most: self.most };
-        let share = if steady > turn { (whole.beyond(steady) / whole.beyond(turn)).max(0.0) } else { 1.0 };
-        Sinking { share: share * (1.0 - fineness), ..whole }
+        let whole = Sinking { shown, hertz, turn, share: 1.0, limit: self.most, most: 0.0 };
+        let lacking = whole.beyond(turn, root);
+        let share = if steady > turn { (whole.beyond(steady, steady.cbrt()) / lacking).max(0.0) } else { 1.0 };
+        let share = share * (1.0 - fineness);
+        Sinking { share, most: share * lacking * whole.bend(share * lacking), ..whole }
     }
 
     /// How much of a load at that squared distance (m^2) counts as one here.
@@ -78,52 +81,55 @@ pub(super) struct Sinking {
     hertz: f64,
     turn: f64,
     share: f64,
+    /// It does not sink in as deep as this (m).
+    limit: f64,
+    /// The largest depth (m).
     most: f64,
 }
 
 impl Sinking {
     /// The depth (m) under `force` (N); it grows with the force.
     pub(super) fn at(&self, force: f64) -> f64 {
-        let lacking = self.lacking(force);
+        if force >= self.turn {
+            return self.most;
+        }
+        let force = force.max(0.0);
+        let lacking = self.share * self.beyond(force, force.cbrt());
         lacking * self.bend(lacking)
     }
 
     /// The largest depth (m).
     pub(super) fn most(&self) -> f64 {
-        self.at(self.turn)
+        self.most
     }
 
     /// The depth around `force` (N), as linear in it.
     pub(super) fn tangent(&self, force: f64) -> Sunk {
         if force >= self.turn {
-            return Sunk { offset: self.most(), slope: 0.0 };
+            return Sunk { offset: self.most, slope: 0.0 };
         }
         // At no force it would be infinitely steep.
         let force = force.max(1e-9 * self.turn);
         let root = force.cbrt();
         let crushed = 4.0 / 3.0 * CRUSHED * self.shown * (self.shown / self.hertz) * root;
-        let lacking = self.lacking(force);
+        let lacking = self.share * self.beyond(force, root);
         let bend = self.bend(lacking);
         let slope = self.share * (2.0 / 3.0 * self.hertz / root - self.shown - crushed) * bend.powi(9);
         Sunk { offset: lacking * bend - slope * force, slope }
     }
 
-    /// What the elements lack (m) under `force` (N).
-    fn lacking(&self, force: f64) -> f64 {
-        self.share * self.beyond(force.clamp(0.0, self.turn))
-    }
-
-    /// The same of elements that are coarse by all means, where they show more and more of it too.
-    fn beyond(&self, force: f64) -> f64 {
-        let [whole, shown] = [self.hertz * (force * force).cbrt(), self.shown * force];
+    /// What elements that are coarse by all means lack (m) under `force` (N) with that cubic root, beyond the turn too, where they show more
+    /// and more of it.
+    fn beyond(&self, force: f64, root: f64) -> f64 {
+        let [whole, shown] = [self.hertz * root * root, self.shown * force];
         if shown == 0.0 { whole } else { whole - shown - CRUSHED * shown * (shown / whole) }
     }
 
-    /// How much of what is `lacking` (m) the tool sinks in: nearly all, but never as much as `most`. It comes near to that in a bend,
-    /// x / (1 + (x / most)^8)^(1/8): at a corner the surface, which the tool has left behind, would have to keep up with it from one
+    /// How much of what is `lacking` (m) the tool sinks in: nearly all, but never as much as the limit. It comes near to that in a bend,
+    /// x / (1 + (x / limit)^8)^(1/8): at a corner the surface, which the tool has left behind, would have to keep up with it from one
     /// step to the next, and its inertia would be felt as a jump.
     fn bend(&self, lacking: f64) -> f64 {
-        (1.0 + (lacking / self.most).powi(8)).sqrt().sqrt().sqrt().recip()
+        (1.0 + (lacking / self.limit).powi(8)).sqrt().sqrt().sqrt().recip()
     }
 }
 
@@ -133,19 +139,23 @@ pub(super) fn ramp(value: f64, [low, high]: [f64; 2]) -> f64 {
     share * share * (3.0 - 2.0 * share)
 }
 
-/// A depth that is linear in the force.
+/// A depth (m) that is linear in the force (N), or by how much the surface closes less on a tool that sinks in so deep within a step (m/s),
+/// linear in the impulse (N s).
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sunk {
-    /// Without a force (m).
     offset: f64,
-    /// m/N.
     pub(super) slope: f64,
 }
 
 impl Sunk {
-    /// The depth (m) under `force` (N).
-    pub(super) fn at(&self, force: f64) -> f64 {
-        self.offset + self.slope * force
+    /// Under that force or impulse.
+    pub(super) fn at(&self, load: f64) -> f64 {
+        self.offset + self.slope * load
+    }
+
+    /// The speed for what was the depth, in a step of `d` seconds.
+    pub(super) fn over(&self, d: f64) -> Self {
+        Self { offset: self.offset / d, slope: self.slope / (d * d) }
     }
 }
 

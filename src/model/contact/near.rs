@@ -23,6 +23,16 @@ pub(super) fn is_off(away: &Vec3, radius: f64) -> bool {
     away.norm() > ON_SURFACE * radius
 }
 
+/// True if the whole `axis` is so far in front of the plane of a triangle with this `corner` that it is [off](is_off) each of its places;
+/// `across` is the triangle's, of any length.
+pub(super) fn is_in_front(axis: &[Vec3; 2], corner: &Vec3, across: &Vec3, radius: f64) -> bool {
+    let least = (ON_SURFACE * radius).powi(2) * across.norm_squared();
+    axis.iter().all(|end| {
+        let ahead = (end - corner).dot(across);
+        ahead > 0.0 && ahead * ahead > least
+    })
+}
+
 /// Out of the body at the place of a triangle that is so far `away` (m) from a tool's axis; `across` is the triangle's, of any length. `None`
 /// for a triangle without an area.
 pub(super) fn outward(away: &Vec3, across: &Vec3, radius: f64) -> Option<Vec3> {

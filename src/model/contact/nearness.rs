@@ -60,7 +60,7 @@ impl Nearness {
         let shares = self.shares.of(place, |shares| {
             shares.iter_mut().zip(rows.iter().enumerate()).for_each(|(to, near)| *to = share(near));
         });
-        self.beside.iter_mut().zip(shares).for_each(|(beside, share)| *beside += share * more);
+        shares.for_each(|(at, share)| self.beside[at] += share * more);
     }
 
     /// How much of a load at one place counts as one at another; all of it at itself.

@@ -31,7 +31,7 @@ pub(super) struct Row {
     pub(super) along: f64,
     /// How deep the tool sinks in beside the elements, and how coarse they are, if that is known.
     pub(super) sinking: Option<(Sinking, Grain)>,
-    /// The same, linear around the force that is expected.
+    /// The same as the speed that it takes away in the step, linear around the impulse that is expected.
     pub(super) sunk: Sunk,
     pub(super) stuck: bool,
     pub(super) glued: bool,

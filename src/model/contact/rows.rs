@@ -11,7 +11,7 @@ use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use super::work::Work;
 use super::{ContactMode, Law, ToolMotion};
-use crate::{Mat3, Pose, Vec3};
+use crate::{Mat3, Vec3};
 
 /// A place of which less than this share can move is held: its few movable nodes would have to fly.
 const HELD: f64 = 0.1;
@@ -159,28 +159,49 @@ impl Rows {
         touch.settle(body.surface, body.positions, d);
         let touch = &*touch;
         self.search.find(body, (tool, touch), motion, d);
+        let axes = [&motion.from, &motion.to].map(|pose| touch.shape.axis(pose));
+        let turned = motion.to.turned_since(&motion.from);
         for place in 0..self.search.near.len() {
             let near = self.search.near[place];
-            self.add(body, (tool, touch), motion, d, near);
+            // The tool's own point that is nearest at the end, and how fast it moves.
+            let of_tool = axes.map(|[a, b]| a * (1.0 - near.share) + b * near.share);
+            let target = (motion.way() + turned.cross(&(near.place - motion.to.position))) / d;
+            self.add(body, (tool, touch), (of_tool, target), d, near);
         }
     }
 
-    fn add(&mut self, body: &Deformable<'_>, (tool, touch): (usize, &Touch), motion: ToolMotion, d: f64, near: Near) {
-        let first = self.nodes.len();
-        let corners = body.surface.triangles[near.triangle as usize];
-        for (node, weight) in corners.into_iter().zip(near.weights).filter(|&(_, weight)| weight > 0.0) {
-            for (node, share) in touch.skin.shares(node, touch.steady.fineness) {
-                // Corners share nodes.
-                let place = &mut self.listed[node as usize];
+    /// Lists the nodes of a place with their weights; returns where the list begins.
+    fn list_nodes(&mut self, corners: [u32; 3], touch: &Touch, weights: &[f64; 3]) -> usize {
+        let (first, fine) = (self.nodes.len(), touch.steady.fineness);
+        let Self { nodes, listed, .. } = self;
+        for (corner, &weight) in corners.into_iter().zip(weights).filter(|&(_, &weight)| weight > 0.0) {
+            // Corners share nodes.
+            touch.skin.each_share(corner, fine, |node, share| {
+                let place = &mut listed[node as usize];
                 if *place == 0 {
-                    self.nodes.push((node, 0.0));
-                    *place = (self.nodes.len() - first) as u32;
+                    nodes.push((node, weight * share));
+                    *place = (nodes.len() - first) as u32;
+                } else {
+                    nodes[first + *place as usize - 1].1 += weight * share;
                 }
-                self.nodes[first + *place as usize - 1].1 += weight * share;
-            }
+            });
         }
+        nodes[first..].iter().for_each(|&(node, _)| listed[node as usize] = 0);
+        first
+    }
+
+    /// Adds the row of one: `at` is where the tool's own point there was before the step and is after it, and `target` how fast it moves.
+    fn add(
+        &mut self,
+        body: &Deformable<'_>,
+        (tool, touch): (usize, &Touch),
+        (at, target): ([Vec3; 2], Vec3),
+        d: f64,
+        near: Near,
+    ) {
+        let corners = body.surface.triangles[near.triangle as usize];
+        let first = self.list_nodes(corners, touch, &near.weights);
         let nodes = &self.nodes[first..];
-        nodes.iter().for_each(|&(node, _)| self.listed[node as usize] = 0);
         let (mut velocity, mut position, mut compliance, mut movable) = (Vec3::zeros(), Vec3::zeros(), 0.0, 0.0);
         for &(node, w) in nodes {
             let (node, inverse_mass) = (node as usize, body.inverse_masses[node as usize]);
@@ -190,16 +211,13 @@ impl Rows {
             movable += if inverse_mass > 0.0 { w } else { 0.0 };
         }
         let is_held = movable < HELD || compliance < IMMOVABLE;
-        // The tool's own point that is nearest at the end: where it was, and how fast it moves.
-        let at = |pose: &Pose| touch.shape.axis(pose)[0] * (1.0 - near.share) + touch.shape.axis(pose)[1] * near.share;
-        let arm = near.place - motion.to.position;
-        let turned = motion.to.turned_since(&motion.from);
-        let target = (motion.way() + turned.cross(&arm)) / d;
-        let depth = (at(&motion.to) - near.place).dot(&near.normal) - touch.shape.radius() - near.gap;
-        let before = (at(&motion.from) - position).dot(&near.normal) - touch.shape.radius() - depth;
+        let depth = (at[1] - near.place).dot(&near.normal) - touch.shape.radius() - near.gap;
+        let before = (at[0] - position).dot(&near.normal) - touch.shape.radius() - depth;
         // What overlapped before is pushed out slowly; what would overlap by the motion is met at once.
         let nodes_at = corners.map(|node| body.positions[node as usize]);
-        let grain = touch.skin.grain(corners, &near.weights, &nodes_at);
+        // Fine elements show all of it.
+        let is_fine = touch.steady.fineness == 1.0;
+        let grain = if is_fine { None } else { touch.skin.grain(corners, &near.weights, &nodes_at) };
         let grain = grain.map(|grain| grain.stiffened(touch.stiffness));
         let sinking = grain.map(|grain| (grain.sinking(touch.shape.radius(), touch.steady), grain));
         let sunk = sinking.map_or(0.0, |(sinking, _)| sinking.most());

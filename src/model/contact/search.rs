@@ -6,7 +6,7 @@ use super::corners::{self, Corners, chord};
 use super::deformable::Deformable;
 use super::extent::Extent;
 use super::inside::{MOST_PARTS, Surroundings};
-use super::near::{Near, is_off, outward};
+use super::near::{Near, is_in_front, is_off, outward};
 use super::passing;
 use super::swept::MAX_DEPTH;
 use super::touch::{MOST_POINTS, Touch};
@@ -22,6 +22,8 @@ pub(super) struct Search {
     vicinities: Vec<[Vicinity; 2]>,
     /// The corners of a vicinity as the tool meets them at the start of the step, and at its end if nothing presses (m).
     corners: Vec<[Vec3; 2]>,
+    /// How far these are from the tool's axis then, squared (m^2).
+    squares: Vec<f64>,
     fine: Corners,
     /// How far the triangles of a vicinity are from the tool's axis at least, squared (m^2).
     apart: Vec<f64>,
@@ -31,7 +33,7 @@ pub(super) struct Search {
     sides: Vec<u8>,
 }
 
-/// How far the nearest place that the axis is in front of is from it, and the nearest that it is behind (m), and whether it goes through
+/// How far the nearest place that the axis is in front of is from it at most, and the nearest that it is behind (m), and whether it goes through
 /// the surface.
 struct Around {
     front: f64,
@@ -51,6 +53,7 @@ impl Search {
     pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
         self.vicinities.iter_mut().flatten().for_each(|vicinity| vicinity.make_room(nodes, candidates));
         self.corners.reserve(nodes);
+        self.squares.reserve(nodes);
         self.sides.reserve(nodes);
         self.apart.reserve(candidates);
         self.fine.make_room(nodes);
@@ -120,23 +123,19 @@ impl Search {
         !self.near.is_empty()
     }
 
-    /// Whatever is near at the end of the step; returns how far the nearest place in front of the surface is from the axis (m).
+    /// Whatever is near at the end of the step; returns how far the nearest place in front of the surface is from the axis at most (m).
     fn find_near(&mut self, vicinity: &Vicinity, touch: &Touch, pose: &Pose) -> f64 {
-        let axis = touch.shape.axis(pose);
-        let Self { near: list, corners, fine: met, .. } = self;
-        met.find(
-            vicinity,
-            |place| corners[place as usize][1],
-            touch,
-            &axis,
-            |found| keep(list, found, touch.shape.radius()),
-        );
+        let (axis, radius) = (touch.shape.axis(pose), touch.shape.radius());
+        let Self { near: list, corners, squares, fine: met, .. } = self;
+        squares.clear();
+        squares.extend(corners.iter().map(|[_, end]| closest::squared_to(&axis, end)));
+        met.find((vicinity, corners, squares), touch, &axis, |found| keep(list, found, radius));
         let Around { front, behind, passes } = self.look_around(vicinity, touch, &axis);
         let may_be_inside = if is_long(touch) {
             behind.is_finite()
         } else {
             // A centre inside is nearest to the inner side of some triangle.
-            behind < front * (1.0 - 1e-9) && behind < MAX_DEPTH + touch.shape.radius()
+            behind < front * (1.0 - 1e-9) && behind < MAX_DEPTH + radius
         };
         if may_be_inside {
             let Self { near: list, corners, outs, .. } = self;
@@ -151,22 +150,35 @@ impl Search {
         let coarse = 1.0 - fine;
         let is_long = is_long(touch);
         let around_axis = Extent::around(axis);
-        let Self { near: list, corners, fine: met, apart, .. } = self;
+        let Self { near: list, corners, squares, fine: met, apart, .. } = self;
         apart.clear();
         let mut around = Around { front: f64::INFINITY, behind: f64::INFINITY, passes: false };
         for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
-            let corners = places.map(|place| corners[place as usize][1]);
-            let depths = places.map(|place| coarse * skin.depth(vicinity.nodes[place as usize] as usize));
+            let [a, b, c] = places.map(|place| place as usize);
+            let depths = if coarse == 0.0 {
+                [0.0; 3]
+            } else {
+                [a, b, c].map(|place| coarse * skin.depth(vicinity.nodes[place] as usize))
+            };
             // It touches, or is the nearest of all.
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
             let distance = touching.max(around.front.min(radius + MAX_DEPTH));
-            let squared = Extent::around(&corners).apart_squared(&around_axis);
+            let squares = [squares[a], squares[b], squares[c]];
+            let [a, b, c] = [&corners[a][1], &corners[b][1], &corners[c][1]];
+            let mut squared = closest::least_squared(squares, a, b, c);
+            if squared <= distance * distance {
+                squared = squared.max(Extent::around([a, b, c]).apart_squared(&around_axis));
+            }
             apart.push(squared);
             if squared > distance * distance {
                 continue;
             }
-            let [a, b, c] = &corners;
             let across = (b - a).cross(&(c - a));
+            if fine == 1.0 && met.are_all_met(places) && is_in_front(axis, a, &across, radius) {
+                around.front = squares.iter().fold(around.front, |front, squared| front.min(squared.sqrt()));
+                continue;
+            }
+            let corners = [*a, *b, *c];
             let shares = [closest::share_of_axis(axis, &corners), 0.0, 1.0];
             for share in if is_long { &shares[..] } else { &shares[..1] } {
                 let centre = axis[0] + (axis[1] - axis[0]) * *share;

@@ -122,12 +122,14 @@ impl Skin {
         }
     }
 
-    /// The nodes that make the corner of `node` where elements are so `fine` (0 to 1), with their shares.
-    pub(super) fn shares(&self, node: u32, fine: f64) -> impl Iterator<Item = (u32, f64)> {
+    /// Calls `visit` for the nodes that make the corner of `node` where elements are so `fine` (0 to 1), with their shares.
+    pub(super) fn each_share(&self, node: u32, fine: f64, mut visit: impl FnMut(u32, f64)) {
         let corner = if fine < 1.0 { self.corner(node) } else { &[] };
+        corner.iter().for_each(|&(other, share)| visit(other, share * (1.0 - fine)));
         let own = if corner.is_empty() { 1.0 } else { fine };
-        let smoothed = corner.iter().map(move |&(other, share)| (other, share * (1.0 - fine)));
-        smoothed.chain((own > 0.0).then_some((node, own)))
+        if own > 0.0 {
+            visit(node, own);
+        }
     }
 
     /// The grain of the body at `weights` of three nodes, which are at `places` (m), if it is known.

@@ -55,7 +55,7 @@ impl Rows {
         } else {
             Sweeps { rows, answers: shared, find, work, law: *law, d }.go_calmly();
         }
-        for row in rows.iter() {
+        for row in rows.iter().filter(|row| row.impulse != Vec3::zeros()) {
             for &(node, w) in of(row) {
                 let node = node as usize;
                 body.positions[node] += body.velocities[node] * row.before;
@@ -117,7 +117,7 @@ struct Sweeps<'a, C, F> {
     d: f64,
 }
 
-impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut [C])> Sweeps<'_, C, F> {
+impl<C: Copy + Default + PartialEq + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut [C])> Sweeps<'_, C, F> {
     /// Sweeps with the friction of the law, and again with less while they run away.
     fn go_calmly(&mut self) {
         self.answers.begin(self.rows.len());
@@ -160,7 +160,7 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
         }
         let Self { rows, answers, find, work, .. } = self;
         let answers = answers.of(place, |column| find(rows, place, column));
-        work.closing.iter_mut().zip(answers).for_each(|(closing, &answer)| *closing -= answer * change);
+        answers.for_each(|(at, answer)| work.closing[at] -= answer * change);
     }
 
     /// Updates rows to and fro until nothing changes, beginning with what pressed in the last step. How deep the tool sinks in is taken as
@@ -192,7 +192,7 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
     fn take_depths(&mut self) {
         for (place, row) in self.rows.iter_mut().enumerate() {
             if let Some((sinking, _)) = &row.sinking {
-                row.sunk = sinking.tangent(self.work.nearness.load(place) / self.d);
+                row.sunk = sinking.tangent(self.work.nearness.load(place) / self.d).over(self.d);
             }
         }
     }
@@ -203,7 +203,7 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
         self.work.before.clone_from(&self.work.closing);
         for place in (0..count).chain((0..count).rev()) {
             let (closing, beside) = (self.work.closing[place], self.work.nearness.beside(place));
-            let change = self.rows[place].update(closing, &self.law, beside, self.d);
+            let change = self.rows[place].update(closing, &self.law, beside);
             self.answer(place, change);
             self.work.nearness.change(self.rows, place);
         }
@@ -218,9 +218,9 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
     /// solved for again.
     fn solve_exactly(&mut self) {
         for _ in 0..MOST_LET_GO {
-            let Self { rows, answers, work, d, .. } = &mut *self;
+            let Self { rows, answers, work, .. } = &mut *self;
             let Work { nearness, exact, closing, .. } = &mut **work;
-            if !exact.solve(rows, nearness, answers, closing, *d) {
+            if !exact.solve(rows, nearness, answers, closing) {
                 return;
             }
             let part = exact.part(rows);
@@ -250,10 +250,10 @@ impl<C: Copy + Default + Mul<Vec3, Output = Vec3>, F: FnMut(&[Row], usize, &mut 
         let Work { nearness, closing, .. } = &*self.work;
         self.rows.iter().enumerate().all(|(place, row)| {
             row.sinking.as_ref().is_none_or(|(sinking, _)| {
-                let force = nearness.load(place) / self.d;
-                let depth = sinking.at(force);
+                let load = nearness.load(place);
+                let depth = sinking.at(load / self.d);
                 if row.presses() {
-                    return (row.sunk.at(force) - depth).abs() <= FOUND * depth;
+                    return (row.sunk.at(load) * self.d - depth).abs() <= FOUND * depth;
                 }
                 // Around a larger force the tool was taken to sink in deeper than it does: that alone releases nothing.
                 let left = (closing[place].dot(&row.normal) - row.allowed) * self.d;
@@ -274,7 +274,7 @@ impl Row {
     }
 
     /// Makes its impulse anew for the surface's velocity `closing` against the tool (m/s); returns the change (N s).
-    fn update(&mut self, closing: Vec3, law: &Law, beside: f64, d: f64) -> Vec3 {
+    fn update(&mut self, closing: Vec3, law: &Law, beside: f64) -> Vec3 {
         if self.mode == ContactMode::Lost {
             return Vec3::zeros();
         }
@@ -286,7 +286,7 @@ impl Row {
         }
         let n = self.normal;
         let (pressed, speed) = (before.dot(&n), closing.dot(&n));
-        let along = self.normal_impulse(pressed + (speed - self.allowed) / self.along, beside, d);
+        let along = self.normal_impulse(pressed, speed, beside);
         // Written so that what is no number releases.
         let (mode, impulse) = if along > 0.0 {
             let across = (before - n * pressed) + (closing - n * speed) / self.compliance;
@@ -299,12 +299,13 @@ impl Row {
         impulse - before
     }
 
-    /// The impulse along the normal (N s), where `rigid` would be that of a tool that does not sink in beside the elements: so
-    /// much less that what the surface is pushed less is what the tool sinks in.
-    fn normal_impulse(&self, rigid: f64, beside: f64, d: f64) -> f64 {
+    /// The impulse along the normal (N s) for one that closes with `speed` (m/s) while it is `pressed` (N s), and others are pressed
+    /// `beside` it. Where the tool sinks in beside the elements it is so much less that what the surface is pushed less is what it sinks in.
+    fn normal_impulse(&self, pressed: f64, speed: f64, beside: f64) -> f64 {
         if self.sinking.is_none() {
-            return rigid;
+            return pressed + (speed - self.allowed) / self.along;
         }
-        (self.along * rigid - self.sunk.at(beside / d) / d) / (self.along + self.sunk.slope / (d * d))
+        let left = self.along * pressed + (speed - self.allowed) - self.sunk.at(beside);
+        left / (self.along + self.sunk.slope)
     }
 }
