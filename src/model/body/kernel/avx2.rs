@@ -172,6 +172,24 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn shift_down(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe {
+            let (low, high) = (_mm256_permute2f128_pd::<0x21>(a[0], a[1]), _mm256_permute2f128_pd::<0x21>(a[1], b[0]));
+            [_mm256_shuffle_pd::<0b0101>(a[0], low), _mm256_shuffle_pd::<0b0101>(a[1], high)]
+        }
+    }
+
+    #[inline(always)]
+    fn shift_up(self, a: Pair, b: Pair) -> Pair {
+        // SAFETY: the features were detected.
+        unsafe {
+            let (low, high) = (_mm256_permute2f128_pd::<0x21>(a[1], b[0]), _mm256_permute2f128_pd::<0x21>(b[0], b[1]));
+            [_mm256_shuffle_pd::<0b0101>(low, b[0]), _mm256_shuffle_pd::<0b0101>(high, b[1])]
+        }
+    }
+
+    #[inline(always)]
     fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Pair; 4]; 2] {
         // SAFETY: the features were detected; a motion is eight doubles.
         unsafe {

@@ -1,4 +1,4 @@
-//! AVX-512: eight doubles in one register, the reciprocal root from the 14-bit estimate and two Newton steps.
+//! AVX-512: eight doubles in one register, the reciprocal root from the 14-bit estimate and three terms of a series.
 //!
 //! A value of [`Avx512`] is made by [`Avx512::detect`] alone, so whoever has one may call the instructions: that is the
 //! reason why every block here is sound. Loads and stores go through references to whole arrays.
@@ -107,15 +107,13 @@ impl Simd for Avx512 {
     fn inverse_root(self, x: __m512d) -> __m512d {
         // SAFETY: the features were detected.
         unsafe {
-            let half = _mm512_set1_pd(0.5);
-            let half_x = _mm512_mul_pd(half, x);
-            let mut y = _mm512_rsqrt14_pd(x);
-            // 14 bits, 28, 56. First half x times y, so that nothing overflows on the way.
-            for _ in 0..2 {
-                let rest = _mm512_fnmadd_pd(_mm512_mul_pd(half_x, y), y, half);
-                y = _mm512_fmadd_pd(y, rest, y);
-            }
-            y
+            let y = _mm512_rsqrt14_pd(x);
+            // e = 1 - x y^2 is below 2^-13. First x times y, so that nothing overflows on the way.
+            let e = _mm512_fnmadd_pd(_mm512_mul_pd(x, y), y, _mm512_set1_pd(1.0));
+            // (1 - e)^(-1/2) = 1 + e / 2 + 3 e^2 / 8 + 5 e^3 / 16 + ...
+            let series = _mm512_fmadd_pd(e, _mm512_set1_pd(5.0 / 16.0), _mm512_set1_pd(3.0 / 8.0));
+            let series = _mm512_fmadd_pd(e, series, _mm512_set1_pd(0.5));
+            _mm512_fmadd_pd(y, _mm512_mul_pd(e, series), y)
         }
     }
 
@@ -194,6 +192,24 @@ impl Simd for Avx512 {
             _mm512_storeu_pd(to, _mm512_permutex2var_pd(a, _mm512_setr_epi64(0, 1, 8, 3, 4, 9, 6, 7), z));
             _mm512_storeu_pd(to.add(8), _mm512_permutex2var_pd(b, _mm512_setr_epi64(10, 1, 2, 11, 4, 5, 12, 7), z));
             _mm512_storeu_pd(to.add(16), _mm512_permutex2var_pd(c, _mm512_setr_epi64(0, 13, 2, 3, 14, 5, 6, 15), z));
+        }
+    }
+
+    #[inline(always)]
+    fn shift_down(self, a: __m512d, b: __m512d) -> __m512d {
+        // SAFETY: the features were detected.
+        unsafe {
+            let (a, b) = (_mm512_castpd_si512(a), _mm512_castpd_si512(b));
+            _mm512_castsi512_pd(_mm512_alignr_epi64::<1>(b, a))
+        }
+    }
+
+    #[inline(always)]
+    fn shift_up(self, a: __m512d, b: __m512d) -> __m512d {
+        // SAFETY: the features were detected.
+        unsafe {
+            let (a, b) = (_mm512_castpd_si512(a), _mm512_castpd_si512(b));
+            _mm512_castsi512_pd(_mm512_alignr_epi64::<7>(b, a))
         }
     }
 

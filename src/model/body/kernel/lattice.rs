@@ -1,8 +1,8 @@
 //! The spring forces of a lattice, eight nodes at once.
 //!
 //! For each of the 13 forward offsets, node p is joined to node p + delta in linear numbering; a bit for every node says
-//! whether the spring is there, so there are no borders to treat. Own forces stay in registers, the opposite forces are
-//! subtracted further on.
+//! whether the spring is there, so there are no borders to treat. Own forces stay in registers, and so do the opposite forces until all
+//! is known that three neighbouring offsets subtract further on.
 
 use std::ops::Range;
 
@@ -90,7 +90,8 @@ impl LatticePart {
     fn new(springs: &LatticeSprings, eights: Range<usize>) -> Self {
         let first = eights.start * LANES;
         let end = eights.end * LANES + springs.reach();
-        Self { nodes: first..end.min(springs.nodes), arrays: Arrays::new(end - first), eights }
+        // Forces begin an eight later, and end one later: what is subtracted from nodes before the first and beyond the last is nothing.
+        Self { nodes: first..end.min(springs.nodes), arrays: Arrays::new(end - first + 2 * LANES), eights }
     }
 
     /// The nodes in whose range the springs begin.
@@ -114,7 +115,7 @@ impl LatticePart {
 
     /// Adds the forces on nodes beyond the own ones to `rest`, which begins where these end.
     fn add_beyond(&mut self, rest: &mut [Vec3]) {
-        let (beyond, own) = (self.nodes.end - self.own().end, self.own().len());
+        let (beyond, own) = (self.nodes.end - self.own().end, LANES + self.own().len());
         let (_, [x, y, z]) = self.arrays.split();
         for (n, force) in rest[..beyond].iter_mut().enumerate() {
             *force += Vec3::new(x[own + n], y[own + n], z[own + n]);
@@ -151,7 +152,7 @@ impl Work for Evaluation<'_> {
                 accumulate(s, springs, eights, Varied { sets, set_of }, motion, forces);
             }
         }
-        store(s, [fx, fy, fz], out);
+        store(s, [&fx[LANES..], &fy[LANES..], &fz[LANES..]], out);
     }
 }
 
@@ -248,55 +249,161 @@ impl<'a, S: Simd> Source<S> for Varied<'a> {
     }
 }
 
+/// What the springs of an eight, in one direction, push at the nodes further on (N).
+type Pushes<S> = [<S as Simd>::V; 3];
+
+/// What is still to be subtracted from nodes of another row of the lattice, to which three offsets lead: to the column before, the same
+/// and the next. Their ends overlap by all but one node. They are summed in registers, one eight later, when all is known of them:
+/// what one offset subtracted would have to be in memory before the next one could go on.
+#[derive(Clone, Copy)]
+struct Pending<S: Simd> {
+    /// What is known of the sums.
+    sums: Pushes<S>,
+    /// Of the springs to the column before, and to the next.
+    back: Pushes<S>,
+    on: Pushes<S>,
+    /// Eights until nothing is left.
+    left: u8,
+}
+
+impl<S: Simd> Pending<S> {
+    #[inline(always)]
+    fn none(s: S) -> Self {
+        let none = [s.splat(0.0); 3];
+        Self { sums: none, back: none, on: none, left: 0 }
+    }
+
+    /// Subtracts what the eight before pushed at the nodes from `end` on, and takes what the present one pushes.
+    #[inline(always)]
+    fn take(&mut self, s: S, [back, same, on]: [Pushes<S>; 3], forces: &mut [&mut [f64]; 3], end: usize) {
+        for axis in 0..3 {
+            let sum = s.add(self.sums[axis], s.shift_down(self.back[axis], back[axis]));
+            let force = lane_mut(forces[axis], end);
+            s.store(s.sub(s.load(force), sum), force);
+            self.sums[axis] = s.add(same[axis], s.shift_up(self.on[axis], on[axis]));
+        }
+        (self.back, self.on) = (back, on);
+    }
+}
+
+/// Positions and velocities of eight nodes.
+#[derive(Clone, Copy)]
+struct Eight<S: Simd> {
+    positions: [S::V; 3],
+    velocities: [S::V; 3],
+}
+
+impl<S: Simd> Eight<S> {
+    #[inline(always)]
+    fn load(s: S, [x, y, z, u, v, w]: &[&[f64]; 6], first: usize) -> Self {
+        Self {
+            positions: [s.load(lane(x, first)), s.load(lane(y, first)), s.load(lane(z, first))],
+            velocities: [s.load(lane(u, first)), s.load(lane(v, first)), s.load(lane(w, first))],
+        }
+    }
+
+    /// The forces (N) of springs to the nodes of `other`, where there are `bits`, with stiffness, damping and k L0.
+    #[inline(always)]
+    fn pull(
+        &self,
+        s: S,
+        other: &Self,
+        bits: u8,
+        [stiffness, damping, preload]: [S::V; 3],
+        rest_length: f64,
+    ) -> Pushes<S> {
+        let (mut along, mut closing) = ([s.splat(0.0); 3], [s.splat(0.0); 3]);
+        for axis in 0..3 {
+            along[axis] = s.sub(other.positions[axis], self.positions[axis]);
+            closing[axis] = s.sub(other.velocities[axis], self.velocities[axis]);
+        }
+        let shortest = s.splat(shortest(rest_length));
+        let joined = Springs { exist: s.mask(bits), stiffness, damping, preload, shortest };
+        let scale = scale(s, &along, &closing, &joined);
+        for pull in &mut along {
+            *pull = s.mul(scale, *pull);
+        }
+        along
+    }
+}
+
+/// Adds the forces of springs on `own`.
+#[inline(always)]
+fn add<S: Simd>(s: S, own: &mut Pushes<S>, more: Pushes<S>) {
+    for axis in 0..3 {
+        own[axis] = s.add(own[axis], more[axis]);
+    }
+}
+
+/// Adds up what all springs pull: `forces` begin an eight before the nodes.
 #[inline(always)]
 fn accumulate<S: Simd, C: Source<S>>(
     s: S,
     springs: &LatticeSprings,
     eights: Range<usize>,
     source: C,
-    [x, y, z, u, v, w]: [&[f64]; 6],
-    [fx, fy, fz]: [&mut [f64]; 3],
+    motion: [&[f64]; 6],
+    forces: [&mut [f64]; 3],
 ) {
+    let none = [s.splat(0.0); 3];
+    // All are equally long: bounds are checked once for all of them.
+    let ([x, ..], [fx, ..]) = (&motion, &forces);
+    let (length, room) = (x.len(), fx.len());
+    let [x, y, z, u, v, w] = motion;
+    let motion = [&x[..length], &y[..length], &z[..length], &u[..length], &v[..length], &w[..length]];
+    let [fx, fy, fz] = forces;
+    let mut forces = [&mut fx[..room], &mut fy[..room], &mut fz[..room]];
+    let [along_row, rows @ ..] = &springs.offsets;
+    let rows = rows.as_chunks::<3>().0;
+    let (mut pending, mut before) = ([Pending::none(s); 4], none);
+    let count = eights.len();
     for (n, eight) in eights.enumerate() {
         let first = n * LANES;
-        let coefficients = source.eight(eight);
-        let here = [s.load(lane(x, first)), s.load(lane(y, first)), s.load(lane(z, first))];
-        let speed = [s.load(lane(u, first)), s.load(lane(v, first)), s.load(lane(w, first))];
-        let mut own = [s.splat(0.0); 3];
-        for (direction, (bits, offset)) in springs.exist[eight].iter().zip(&springs.offsets).enumerate() {
-            if *bits == 0 {
+        let (coefficients, [along_bits, bits @ ..]) = (source.eight(eight), &springs.exist[eight]);
+        let here = Eight::load(s, &motion, first);
+        let mut own = none;
+        let mut pushed = none;
+        if *along_bits != 0 {
+            let of_spring = source.springs(s, coefficients, 0, along_row.rest_length);
+            let other = Eight::load(s, &motion, first + along_row.delta);
+            pushed = here.pull(s, &other, *along_bits, of_spring, along_row.rest_length);
+            own = pushed;
+        }
+        for axis in 0..3 {
+            own[axis] = s.sub(own[axis], s.shift_up(before[axis], pushed[axis]));
+        }
+        before = pushed;
+        for (row, (bits, pending)) in bits.as_chunks::<3>().0.iter().zip(&mut pending).enumerate() {
+            if *bits == [0; 3] && pending.left == 0 {
                 continue;
             }
-            let other = first + offset.delta;
-            let along = [
-                s.sub(s.load(lane(x, other)), here[0]),
-                s.sub(s.load(lane(y, other)), here[1]),
-                s.sub(s.load(lane(z, other)), here[2]),
-            ];
-            let closing = [
-                s.sub(s.load(lane(u, other)), speed[0]),
-                s.sub(s.load(lane(v, other)), speed[1]),
-                s.sub(s.load(lane(w, other)), speed[2]),
-            ];
-            let [stiffness, damping, preload] = source.springs(s, coefficients, direction, offset.rest_length);
-            let shortest = s.splat(shortest(offset.rest_length));
-            let joined = Springs { exist: s.mask(*bits), stiffness, damping, preload, shortest };
-            let scale = scale(s, &along, &closing, &joined);
-            for axis in 0..3 {
-                own[axis] = s.mul_add(scale, along[axis], own[axis]);
+            let mut pushes = [none; 3];
+            for column in 0..3 {
+                if bits[column] == 0 {
+                    continue;
+                }
+                let offset = &rows[row][column];
+                let of_spring = source.springs(s, coefficients, 1 + 3 * row + column, offset.rest_length);
+                let other = Eight::load(s, &motion, first + offset.delta);
+                pushes[column] = here.pull(s, &other, bits[column], of_spring, offset.rest_length);
+                add(s, &mut own, pushes[column]);
             }
-            let opposite = lane_mut(fx, other);
-            s.store(s.mul_sub_from(scale, along[0], s.load(opposite)), opposite);
-            let opposite = lane_mut(fy, other);
-            s.store(s.mul_sub_from(scale, along[1], s.load(opposite)), opposite);
-            let opposite = lane_mut(fz, other);
-            s.store(s.mul_sub_from(scale, along[2], s.load(opposite)), opposite);
+            pending.left = if *bits == [0; 3] { pending.left - 1 } else { 2 };
+            pending.take(s, pushes, &mut forces, first + rows[row][1].delta);
         }
-        let force = lane_mut(fx, first);
-        s.store(s.add(s.load(force), own[0]), force);
-        let force = lane_mut(fy, first);
-        s.store(s.add(s.load(force), own[1]), force);
-        let force = lane_mut(fz, first);
-        s.store(s.add(s.load(force), own[2]), force);
+        for axis in 0..3 {
+            let force = lane_mut(forces[axis], LANES + first);
+            s.store(s.add(s.load(force), own[axis]), force);
+        }
+    }
+    let first = count * LANES;
+    for axis in 0..3 {
+        let force = lane_mut(forces[axis], LANES + first);
+        s.store(s.sub(s.load(force), s.shift_up(before[axis], none[axis])), force);
+    }
+    for (row, pending) in rows.iter().zip(&mut pending) {
+        for n in 0..usize::from(pending.left) {
+            pending.take(s, [none; 3], &mut forces, first + n * LANES + row[1].delta);
+        }
     }
 }

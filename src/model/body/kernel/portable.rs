@@ -90,6 +90,16 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    fn shift_down(self, a: Lane, b: Lane) -> Lane {
+        [a[1], a[2], a[3], a[4], a[5], a[6], a[7], b[0]]
+    }
+
+    #[inline(always)]
+    fn shift_up(self, a: Lane, b: Lane) -> Lane {
+        [a[7], b[0], b[1], b[2], b[3], b[4], b[5], b[6]]
+    }
+
+    #[inline(always)]
     fn differences(self, nodes: &[Motion], from: &Numbers, to: &Numbers) -> [[Lane; 4]; 2] {
         let mut differences = [[[0.0; LANES]; 4]; 2];
         for lane in 0..LANES {

@@ -59,6 +59,11 @@ pub(crate) trait Simd: Copy {
     /// Sixteen words as the singles whose upper halves their lower halves are, and as the singles that they are.
     fn load_halves(self, from: &[u32; 2 * LANES]) -> [Self::W; 2];
 
+    /// The last seven of `a`, and the first of `b`.
+    fn shift_down(self, a: Self::V, b: Self::V) -> Self::V;
+    /// The last of `a`, and the first seven of `b`.
+    fn shift_up(self, a: Self::V, b: Self::V) -> Self::V;
+
     /// Eight vectors as their coordinates.
     #[inline(always)]
     fn load_vectors(self, from: &[Vec3; LANES]) -> [Self::V; 3] {
