@@ -78,8 +78,7 @@ impl Simulation {
         self.moving.touches.push(Touch::new(ToolShape::Point, Arc::default(), contact));
         let force = self.resting_force(&contact);
         self.moving.means.push(force.into());
-        self.moving.rows = Rows::with_room(self.moving.touches.len());
-        self.moving.rows.make_room(self.moving.inverse_masses.len(), self.moving.candidates.len());
+        self.moving.make_room();
         self
     }
 
@@ -95,7 +94,7 @@ impl Simulation {
             Skin::new(self.moving.body.as_made(), shape.radius())
         };
         self.moving.touches[tool] = Touch::new(shape, Arc::new(skin), self.moving.touches[tool].contact);
-        self.moving.rows.make_room(self.moving.inverse_masses.len(), self.moving.candidates.len());
+        self.moving.make_room();
         self
     }
 
@@ -104,14 +103,12 @@ impl Simulation {
     /// # Real-time
     /// Not real-time safe: allocates.
     pub fn duplicate(&self) -> Option<Self> {
-        let mut rows = Rows::with_room(self.moving.touches.len());
-        rows.make_room(self.moving.inverse_masses.len(), self.moving.candidates.len());
-        let moving = Moving {
+        let mut moving = Moving {
             body: self.moving.body.copy()?,
             state: self.moving.state.clone(),
             forces: self.moving.forces.clone(),
             touches: self.moving.touches.clone(),
-            rows,
+            rows: Rows::default(),
             law: self.moving.law,
             stepping: self.moving.stepping,
             stride: self.moving.stride,
@@ -119,6 +116,7 @@ impl Simulation {
             inverse_masses: self.moving.inverse_masses.clone(),
             means: self.moving.means.clone(),
         };
+        moving.make_room();
         Some(Self { moving, stiffness: self.stiffness, ahead: Box::new(self.ahead.anew()), told: self.told.clone() })
     }
 
@@ -466,7 +464,8 @@ impl Simulation {
     pub fn footprint(&self, tool: usize, pose: &Pose, margin: f64, triangles: &mut Vec<u32>) {
         if self.moving.touches[tool].has_shape() {
             let surface = (self.moving.body.surface(), &self.moving.state.positions[..]);
-            self.moving.touches[tool].footprint(surface, pose, margin, triangles);
+            let reach = self.moving.touches[tool].reach(pose, margin);
+            Touch::footprint(surface, reach, 0..surface.0.triangles.len() as u32, triangles);
         }
     }
 

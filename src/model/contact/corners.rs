@@ -68,7 +68,7 @@ impl Corners {
                 if !std::mem::take(&mut self.is_met[number]) {
                     continue;
                 }
-                let place = corners[number][1];
+                let [from, place] = corners[number];
                 let share = closest::share_at(axis, &place);
                 let away = axis[0] + (axis[1] - axis[0]) * share - place;
                 let gap = away.norm() - radius - beyond(touch, vicinity.nodes[number] as usize);
@@ -78,7 +78,7 @@ impl Corners {
                 let Some(normal) = away.try_normalize(0.0) else { continue };
                 self.is_met[number] = true;
                 let weights = [0, 1, 2].map(|other| if other == corner { 1.0 } else { 0.0 });
-                keep(Near { triangle, weights, place, normal, gap, share });
+                keep(Near { triangle, weights, from, place, normal, gap, share });
             }
         }
     }

@@ -75,6 +75,8 @@ impl Surroundings<'_> {
         let (number, weights, place, across) = found.filter(|_| behind < front * (1.0 - 1e-9))?;
         let normal = outward(&(point - place), &across, radius)?;
         let gap = -behind - vicinity.depth(number, &weights, touch) - radius;
-        Some(Near { triangle: vicinity.triangles[number], weights, place, normal, gap, share })
+        let starts = vicinity.corners[number].map(|place| corners[place as usize][0]);
+        let (triangle, from) = (vicinity.triangles[number], interpolate(&weights, &starts));
+        Some(Near { triangle, weights, from, place, normal, gap, share })
     }
 }

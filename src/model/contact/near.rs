@@ -7,6 +7,8 @@ use crate::Vec3;
 pub(super) struct Near {
     pub(super) triangle: u32,
     pub(super) weights: [f64; 3],
+    /// Where it is at the start of the step, and at its end if nothing presses (m).
+    pub(super) from: Vec3,
     pub(super) place: Vec3,
     pub(super) normal: Vec3,
     /// From the surface to the tool's (m); negative where they overlap.

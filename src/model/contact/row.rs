@@ -49,9 +49,14 @@ impl Row {
     pub(super) fn is_of_point(&self) -> bool {
         self.feature == [u32::MAX; 3]
     }
-}
 
-/// The order of two lists of numbers, by the first that differ.
-pub(super) fn in_order(one: &[f64], other: &[f64]) -> Ordering {
-    one.iter().zip(other).map(|(a, b)| a.total_cmp(b)).find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+    /// The order of two places: by where they are, then by their normals, then by how the tools move there.
+    pub(super) fn in_order(&self, other: &Self) -> Ordering {
+        let by = |one: &Vec3, other: &Vec3| {
+            one.x.total_cmp(&other.x).then_with(|| one.y.total_cmp(&other.y)).then_with(|| one.z.total_cmp(&other.z))
+        };
+        by(&self.place, &other.place)
+            .then_with(|| by(&self.normal, &other.normal))
+            .then_with(|| by(&self.target, &other.target))
+    }
 }

@@ -5,12 +5,13 @@ use super::deformable::Deformable;
 use super::grain::Sunk;
 use super::near::Near;
 use super::resolve::{IMMOVABLE, Place, RECOVERY, approach};
-use super::row::{Row, in_order};
+use super::row::Row;
 use super::search::Search;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use super::work::Work;
 use super::{ContactMode, Law, ToolMotion};
+use crate::mesh::Surface;
 use crate::{Mat3, Vec3};
 
 /// A place of which less than this share can move is held: its few movable nodes would have to fly.
@@ -57,19 +58,19 @@ impl Rows {
         self.coupling.make_room(places.map(|places| places.min(MOST_POINTS)).sum());
     }
 
-    /// Makes room for a body of so many nodes and candidates, and forgets what it knows of another one.
-    pub(crate) fn make_room(&mut self, nodes: usize, candidates: usize) {
+    /// Makes room for tools on a body of so many nodes, with that surface and candidates, and forgets what it knows of another one.
+    pub(crate) fn make_room(&mut self, nodes: usize, surface: (&Surface, &[u32]), touches: &[Touch]) {
         self.at_nodes.resize(nodes, 0.0);
         self.listed.resize(nodes, 0);
-        self.search.make_room(nodes, candidates);
+        self.search.make_room(nodes, surface, touches);
     }
 
-    /// Forgets what it knows of the tools: they have other numbers from now on.
+    /// Two tools have each other's number from now on.
     ///
     /// # Real-time
     /// Wait-free, real-time safe.
-    pub(crate) fn forget(&mut self) {
-        self.search.forget();
+    pub(crate) fn swap(&mut self, one: usize, other: usize) {
+        self.search.swap(one, other);
     }
 
     pub(super) fn clear(&mut self) {
@@ -80,8 +81,7 @@ impl Rows {
     /// Puts rows in the order of their places. Sweeps that end before all is found find the same then in whatever order tools and
     /// triangles are.
     pub(super) fn sort(&mut self) {
-        let key = |row: &Row| [row.place, row.normal, row.target].map(<[f64; 3]>::from);
-        self.rows.sort_unstable_by(|one, other| in_order(key(one).as_flattened(), key(other).as_flattened()));
+        self.rows.sort_unstable_by(Row::in_order);
     }
 
     /// The rows of a tool with the nodes of each.
@@ -202,17 +202,16 @@ impl Rows {
         let corners = body.surface.triangles[near.triangle as usize];
         let first = self.list_nodes(corners, touch, &near.weights);
         let nodes = &self.nodes[first..];
-        let (mut velocity, mut position, mut compliance, mut movable) = (Vec3::zeros(), Vec3::zeros(), 0.0, 0.0);
+        let (mut compliance, mut movable) = (0.0, 0.0);
         for &(node, w) in nodes {
-            let (node, inverse_mass) = (node as usize, body.inverse_masses[node as usize]);
-            velocity += body.velocities[node] * w;
-            position += body.positions[node] * w;
+            let inverse_mass = body.inverse_masses[node as usize];
             compliance += w * w * inverse_mass;
             movable += if inverse_mass > 0.0 { w } else { 0.0 };
         }
         let is_held = movable < HELD || compliance < IMMOVABLE;
         let depth = (at[1] - near.place).dot(&near.normal) - touch.shape.radius() - near.gap;
-        let before = (at[0] - position).dot(&near.normal) - touch.shape.radius() - depth;
+        let closing = (near.place - near.from) / d - target;
+        let before = (at[0] - near.from).dot(&near.normal) - touch.shape.radius() - depth;
         // What overlapped before is pushed out slowly; what would overlap by the motion is met at once.
         let nodes_at = corners.map(|node| body.positions[node as usize]);
         // Fine elements show all of it.
@@ -239,8 +238,8 @@ impl Rows {
             place: near.place,
             normal: near.normal,
             target,
-            closing: velocity - target,
-            allowed: (velocity - target).dot(&near.normal) + (near.gap - gap) / d,
+            closing,
+            allowed: closing.dot(&near.normal) + (near.gap - gap) / d,
             compliance,
             along: compliance,
             sinking,

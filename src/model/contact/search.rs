@@ -12,6 +12,7 @@ use super::swept::MAX_DEPTH;
 use super::touch::{MOST_POINTS, Touch};
 use super::triangle::interpolate;
 use super::vicinity::{NARROW, Vicinity};
+use crate::mesh::Surface;
 use crate::{Pose, Vec3};
 
 /// The places that were found, and what the search keeps from step to step.
@@ -49,19 +50,21 @@ impl Search {
         Self { near, vicinities, outs, ..Self::default() }
     }
 
-    /// Makes room for a body of so many nodes and candidates, and forgets another one.
-    pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
-        self.vicinities.iter_mut().flatten().for_each(|vicinity| vicinity.make_room(nodes, candidates));
+    /// Makes room for tools on a body of so many nodes, with that surface and candidates, and forgets another one.
+    pub(super) fn make_room(&mut self, nodes: usize, surface: (&Surface, &[u32]), touches: &[Touch]) {
+        for (vicinities, touch) in self.vicinities.iter_mut().zip(touches) {
+            vicinities.iter_mut().for_each(|vicinity| vicinity.make_room(nodes, surface, &touch.skin));
+        }
         self.corners.reserve(nodes);
         self.squares.reserve(nodes);
         self.sides.reserve(nodes);
-        self.apart.reserve(candidates);
+        self.apart.reserve(surface.1.len());
         self.fine.make_room(nodes);
     }
 
-    /// Forgets what it keeps of the tools.
-    pub(super) fn forget(&mut self) {
-        self.vicinities.iter_mut().flatten().for_each(Vicinity::forget);
+    /// Two tools have each other's number from now on.
+    pub(super) fn swap(&mut self, one: usize, other: usize) {
+        self.vicinities.swap(one, other);
     }
 
     /// Finds the places that would overlap with a tool at the end of the step if nothing pressed.
@@ -108,14 +111,15 @@ impl Search {
             let [from, to] = [from, to].map(|[a, b]| a + (b - a) * share);
             let found = passing::first(&vicinity.corners, &self.corners, [from, to], &mut self.sides);
             let Some((found, weights)) = found else { continue };
-            let corners = vicinity.corners[found].map(|node| self.corners[node as usize][1]);
-            let place = interpolate(&weights, &corners);
+            let [starts, corners] =
+                [0, 1].map(|time| vicinity.corners[found].map(|node| self.corners[node as usize][time]));
+            let [from, place] = [starts, corners].map(|corners| interpolate(&weights, &corners));
             let across = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
             let Some(normal) = across.try_normalize(0.0) else { continue };
             let gap = (to - place).dot(&normal) - vicinity.depth(found, &weights, touch) - shape.radius();
             let triangle = vicinity.triangles[found];
             is_shallow = is_shallow && surroundings.way_out(share).is_some_and(|out| out.normal.dot(&normal) > 0.0);
-            self.near.push(Near { triangle, weights, place, normal, gap, share });
+            self.near.push(Near { triangle, weights, from, place, normal, gap, share });
         }
         if is_shallow {
             self.near.clear();
@@ -150,7 +154,7 @@ impl Search {
         let coarse = 1.0 - fine;
         let is_long = is_long(touch);
         let around_axis = Extent::around(axis);
-        let Self { near: list, corners, squares, fine: met, apart, .. } = self;
+        let Self { near: list, corners: moving, squares, fine: met, apart, .. } = self;
         apart.clear();
         let mut around = Around { front: f64::INFINITY, behind: f64::INFINITY, passes: false };
         for (&triangle, places) in vicinity.triangles.iter().zip(&vicinity.corners) {
@@ -164,7 +168,7 @@ impl Search {
             let touching = radius + depths.into_iter().fold(0.0, f64::max);
             let distance = touching.max(around.front.min(radius + MAX_DEPTH));
             let squares = [squares[a], squares[b], squares[c]];
-            let [a, b, c] = [&corners[a][1], &corners[b][1], &corners[c][1]];
+            let [a, b, c] = [&moving[a][1], &moving[b][1], &moving[c][1]];
             let mut squared = closest::least_squared(squares, a, b, c);
             if squared <= distance * distance {
                 squared = squared.max(Extent::around([a, b, c]).apart_squared(&around_axis));
@@ -199,7 +203,8 @@ impl Search {
                 let depth: f64 = weights.iter().zip(depths).map(|(w, depth)| w * depth).sum();
                 let gap = distance - depth - radius + fine * chord(&corners, &weights, radius);
                 if gap < 0.0 {
-                    keep(list, Near { triangle, weights, place, normal, gap, share: *share }, radius);
+                    let from = interpolate(&weights, &places.map(|place| moving[place as usize][0]));
+                    keep(list, Near { triangle, weights, from, place, normal, gap, share: *share }, radius);
                 }
             }
         }
@@ -256,7 +261,7 @@ mod tests {
         ] {
             let mut touch = Touch::new(shape, Arc::new(Skin::new(&block, shape.radius())), Contact::default());
             let mut kept = Search::new(1);
-            kept.make_room(block.rest().len(), candidates.len());
+            kept.make_room(block.rest().len(), (block.surface(), &candidates), std::slice::from_ref(&touch));
             let at = |t: f64| {
                 let depth =
                     2e-3 + 4e-3 * (17.0 * t).sin() + shape.radius() * (f64::from((t * 3.0) as i32 % 5) - 3.0).max(0.0);
@@ -279,7 +284,7 @@ mod tests {
                 };
                 let motion = ToolMotion::straight(at(t), at(next));
                 let mut anew = Search::new(1);
-                anew.make_room(block.rest().len(), candidates.len());
+                anew.make_room(block.rest().len(), (block.surface(), &candidates), std::slice::from_ref(&touch));
                 let [wide, small] = &kept.vicinities[0];
                 let is_known = small.is_narrow(&body, &touch, motion, 1e-3) && !wide.triangles.is_empty();
                 kept.find(&body, (0, &touch), motion, 1e-3);
@@ -305,7 +310,7 @@ mod tests {
         };
         let touch = Touch::new(shape, Arc::new(Skin::new(block, shape.radius())), Contact::default());
         let mut search = Search::new(1);
-        search.make_room(block.rest().len(), candidates.len());
+        search.make_room(block.rest().len(), (block.surface(), &candidates), std::slice::from_ref(&touch));
         search.find(&body, (0, &touch), ToolMotion::straight(centre, centre), 1e-3);
         search.near
     }

@@ -154,18 +154,21 @@ impl Touch {
         is_free
     }
 
-    /// Appends the triangles of a surface with nodes at `positions` (m) that the tool touches, or may touch soon, at `pose`, or if
-    /// its radius were larger by `margin` (m).
+    /// The ends of the tool's axis (m) at `pose`, and within how much of it (m) are the triangles that it touches, or may touch soon, or
+    /// if its radius were larger by `margin` (m).
+    pub(crate) fn reach(&self, pose: &Pose, margin: f64) -> ([Vec3; 2], f64) {
+        (self.shape.axis(pose), FOOTPRINT * self.shape.radius() + margin)
+    }
+
+    /// Appends those `among` the triangles of a surface with nodes at `positions` (m) that are within that `reach`.
     pub(crate) fn footprint(
-        &self,
         (surface, positions): (&Surface, &[Vec3]),
-        pose: &Pose,
-        margin: f64,
+        (axis, near): ([Vec3; 2], f64),
+        among: impl IntoIterator<Item = u32>,
         triangles: &mut Vec<u32>,
     ) {
-        let (axis, near) = (self.shape.axis(pose), FOOTPRINT * self.shape.radius() + margin);
-        for (triangle, corners) in (0..).zip(&surface.triangles) {
-            let corners = corners.map(|node| positions[node as usize]);
+        for triangle in among {
+            let corners = surface.triangles[triangle as usize].map(|node| positions[node as usize]);
             if is_near(&corners, &axis, near) && !triangles.contains(&triangle) {
                 triangles.push(triangle);
             }

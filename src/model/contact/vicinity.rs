@@ -3,9 +3,11 @@
 use super::ToolMotion;
 use super::deformable::Deformable;
 use super::extent::Extent;
+use super::skin::Skin;
 use super::swept::MAX_DEPTH;
 use super::touch::Touch;
 use crate::Vec3;
+use crate::mesh::Surface;
 
 /// Triangles are found for tools and surfaces that move by so much together: among all, and among those that were found so (m).
 const MARGIN: f64 = 3e-3;
@@ -21,7 +23,9 @@ pub(super) struct Vicinity {
     pub(super) corners: Vec<[u32; 3]>,
     /// Each once, in the order in which the triangles name them.
     pub(super) nodes: Vec<u32>,
-    /// The ends of the tool's axis, and all nodes of the body, when it was made (m).
+    /// The body's nodes that candidates' corners are made of, in increasing order.
+    surface: Vec<u32>,
+    /// The ends of the tool's axis, and these nodes, when it was made (m).
     axis: [Vec3; 2],
     positions: Vec<Vec3>,
     /// How fine the elements were.
@@ -38,22 +42,33 @@ pub(super) struct Vicinity {
 }
 
 impl Vicinity {
-    /// Of a tool on a body of so many nodes and candidates: not known yet.
-    pub(super) fn make_room(&mut self, nodes: usize, candidates: usize) {
+    /// Of a tool with that `skin` on a body of so many nodes, with that surface and candidates: not known yet.
+    pub(super) fn make_room(&mut self, nodes: usize, (surface, candidates): (&Surface, &[u32]), skin: &Skin) {
         self.forget();
-        self.triangles.reserve(candidates);
-        self.corners.reserve(candidates);
+        self.triangles.reserve(candidates.len());
+        self.corners.reserve(candidates.len());
         self.nodes.reserve(nodes);
         self.extents.clear();
         self.extents.reserve(nodes);
-        self.positions.resize(nodes, Vec3::zeros());
         self.places.clear();
         self.places.resize(nodes, 0);
+        self.seen.clear();
         self.seen.resize(nodes, 0);
+        for corner in candidates.iter().flat_map(|&triangle| surface.triangles[triangle as usize]) {
+            let made_of = skin.corner(corner).iter().map(|&(node, _)| node);
+            // Each corner is of several triangles.
+            if std::mem::replace(&mut self.seen[corner as usize], 2) < 2 {
+                made_of.for_each(|node| self.seen[node as usize] = self.seen[node as usize].max(1));
+            }
+        }
+        self.surface.clear();
+        self.surface.extend((0..nodes as u32).filter(|&node| self.seen[node as usize] > 0));
+        self.positions.clear();
+        self.positions.resize(self.surface.len(), Vec3::zeros());
     }
 
     /// It is not known any more.
-    pub(super) fn forget(&mut self) {
+    fn forget(&mut self) {
         self.is_known = false;
         self.triangles.clear();
         self.corners.clear();
@@ -103,7 +118,9 @@ impl Vicinity {
     /// Things are where it is made.
     fn begin(&mut self, body: &Deformable<'_>, touch: &Touch, motion: ToolMotion) {
         (self.axis, self.fineness) = (touch.shape.axis(&motion.to), touch.steady.fineness);
-        self.positions.copy_from_slice(body.positions);
+        for (to, &node) in self.positions.iter_mut().zip(&self.surface) {
+            *to = body.positions[node as usize];
+        }
     }
 
     fn add(&mut self, triangle: u32, nodes: [u32; 3]) {
@@ -133,7 +150,8 @@ impl Vicinity {
         let tool = tool.fold(0.0, |most: f64, way| most.max(way.norm()));
         let (mut way, mut speed) = ([0.0; 3], [0.0; 3]);
         let larger = |one: f64, other: f64| if one > other { one } else { other };
-        for ((now, then), v) in body.positions.iter().zip(&self.positions).zip(&*body.velocities) {
+        for (&node, then) in self.surface.iter().zip(&self.positions) {
+            let (now, v) = (body.positions[node as usize], body.velocities[node as usize]);
             for axis in 0..3 {
                 way[axis] = larger((now[axis] - then[axis]).abs(), way[axis]);
                 speed[axis] = larger(v[axis].abs(), speed[axis]);

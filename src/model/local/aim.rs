@@ -1,6 +1,7 @@
 //! Which part of the surface the next local models have to hold.
 
 use super::forecast::ToolForecast;
+use crate::contact::Touch;
 use crate::error::ModelError;
 use crate::mesh::{NearestTriangle, Surface};
 use crate::simulation::Simulation;
@@ -60,9 +61,15 @@ impl Aim {
         let margin = if after == 0.0 { 0.0 } else { ROOM * simulation.shape(index).radius() };
         let ways = tool.ways(after, lead);
         triangles.extend(ways.clone().skip(1).map(|place| self.nearest.find(&place)));
+        let touch = simulation.touch(index);
+        if !touch.has_shape() {
+            return;
+        }
+        let (surface, mut near) = ((simulation.body().surface(), &*simulation.state().positions), Vec::new());
         for position in ways {
-            let pose = Pose { position, orientation: tool.orientation };
-            simulation.footprint(index, &pose, margin, triangles);
+            let reach = touch.reach(&Pose { position, orientation: tool.orientation }, margin);
+            self.nearest.around(&reach.0, reach.1, &mut near);
+            Touch::footprint(surface, reach, near.iter().copied(), triangles);
         }
     }
 }

@@ -3,8 +3,8 @@
 
 use super::forecast::LOOKS;
 use crate::body::Body;
-use crate::contact::ToolShape;
-use crate::mesh::Surface;
+use crate::contact::{ToolShape, Touch};
+use crate::mesh::{NearestTriangle, Surface};
 use crate::simulation::Simulation;
 use crate::{Pose, Vec3};
 
@@ -69,6 +69,8 @@ struct Window {
     middle: Vec3,
     /// The outward unit normal there.
     normal: Vec3,
+    /// No node is farther from the middle at rest (m).
+    reach: f64,
     /// Node ids in increasing order.
     patch: Vec<u32>,
     /// Of the first window of its size.
@@ -100,7 +102,9 @@ impl Windows {
         let edges = corners.iter().map(|[a, b, c]| (b - a).norm() + (c - b).norm() + (a - c).norm());
         let edge = edges.sum::<f64>() / (3.0 * corners.len().max(1) as f64);
         let mut windows: Vec<Window> = Vec::new();
-        let mut around = Vec::new();
+        let (mut around, mut near) = (Vec::new(), Vec::new());
+        // A point touches no more than the triangle that it is over.
+        let nearest = touch.has_shape().then(|| NearestTriangle::new(body.surface(), rest).ok()).flatten();
         for Layer { spacing, more, way } in LAYERS {
             let first = windows.len();
             let size = match shape {
@@ -121,14 +125,19 @@ impl Windows {
                 around.clear();
                 around.push(triangle);
                 let pose = Pose::from(middle + normal * (HEIGHT * shape.radius()));
-                if touch.has_shape() {
-                    touch.footprint((body.surface(), rest), &pose, margin, &mut around);
+                if let Some(nearest) = &nearest {
+                    let reach = touch.reach(&pose, margin);
+                    nearest.around(&reach.0, reach.1, &mut near);
+                    Touch::footprint((body.surface(), rest), reach, near.iter().copied(), &mut around);
                 }
                 let mut patch = Vec::new();
                 simulation.patch(tool, &around, size, &mut patch);
-                windows.push(Window { middle: *middle, normal, patch, layer: first });
+                windows.push(Window { middle: *middle, normal, reach: 0.0, patch, layer: first });
             }
             extend_over_small(body, &mut windows[first..]);
+        }
+        for Window { middle, reach, patch, .. } in &mut windows {
+            *reach = patch.iter().map(|&node| (rest[node as usize] - *middle).norm()).fold(0.0, f64::max);
         }
         Self { size, triangles, is_roomy: size[0].min(size[1]) >= ROOMY, windows }
     }
@@ -169,8 +178,9 @@ impl Windows {
                     }
                     let shared = [&beside.soon, &beside.now].into_iter().filter(|nodes| !nodes.is_empty());
                     let together = || first.iter().chain(&beside.triangles);
-                    let mut shared = shared.filter_map(|also| self.best(together(), [nodes, also], &usable));
-                    shared.next().or_else(|| self.best(first.iter(), [nodes, &[]], &usable))
+                    let rest = simulation.body().rest();
+                    let mut shared = shared.filter_map(|also| self.best(rest, together(), [nodes, also], &usable));
+                    shared.next().or_else(|| self.best(rest, first.iter(), [nodes, &[]], &usable))
                 })
             };
             if let Some(window) = on_way(1, true).or_else(|| on_way(AHEAD, false)) {
@@ -222,18 +232,22 @@ impl Windows {
     /// The least of the usable windows that hold what is `pressed`, and of these the one in whose middle `triangles` lie best.
     fn best<'a>(
         &self,
+        rest: &[Vec3],
         triangles: impl Iterator<Item = &'a u32> + Clone,
         pressed: [&[u32]; 2],
         usable: impl Fn(&[u32]) -> bool,
     ) -> Option<&Window> {
         let holds = |patch: &[u32]| pressed.into_iter().flatten().all(|node| patch.binary_search(node).is_ok());
+        let first = pressed.into_iter().flatten().copied().next();
         let mut best: Option<(&Window, f64)> = None;
         for window in &self.windows {
             if best.is_some_and(|(best, _)| best.layer != window.layer) {
                 break;
             }
-            // Of most windows the first node is missing.
-            if !holds(&window.patch) {
+            // Most windows do not reach as far as the first node.
+            if first.is_some_and(|node| (rest[node as usize] - window.middle).norm() > window.reach)
+                || !holds(&window.patch)
+            {
                 continue;
             }
             let far = |&triangle: &u32| (self.triangles[triangle as usize] - window.middle).norm_squared();

@@ -1,5 +1,6 @@
 //! The bridge to parry: the surface triangle nearest to a point. The only file that names it.
 
+use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQueryWithLocation;
 use parry3d_f64::shape::TriMesh;
@@ -61,6 +62,19 @@ impl NearestTriangle {
         let (_, (triangle, _)) = self.mesh.project_local_point_and_get_location(Vector::from(*point), false);
         triangle
     }
+
+    /// Puts the triangles whose boxes come as near as `distance` (m) to the box around two `ends` in place of `found`, in increasing order.
+    ///
+    /// # Real-time
+    /// For the global actor: bounded; `found` may grow.
+    pub(crate) fn around(&self, [one, other]: &[Vec3; 2], distance: f64, found: &mut Vec<u32>) {
+        let reach = Vec3::repeat(distance);
+        let (low, high) = (one.inf(other) - reach, one.sup(other) + reach);
+        let near = Aabb::new(Vector::from(low), Vector::from(high));
+        found.clear();
+        found.extend(self.mesh.bvh().intersect_aabb(&near));
+        found.sort_unstable();
+    }
 }
 
 #[cfg(test)]
@@ -80,5 +94,26 @@ mod tests {
         nearest.refit(&moved);
         let triangle = nearest.find(&Vec3::new(0.06, 0.03, 0.09));
         assert!(block.surface().triangles[triangle as usize].iter().all(|&n| moved[n as usize].z < 0.101));
+    }
+
+    #[test]
+    fn whatever_has_a_corner_near_is_around_and_nothing_far_is() {
+        let block = Block::builder([7; 3], [0.1; 3]).build().unwrap();
+        let mut nearest = NearestTriangle::new(block.surface(), block.rest()).unwrap();
+        let moved: Vec<Vec3> = block.rest().iter().map(|x| x + Vec3::new(0.3 * x.y, 0.0, 0.2 * x.x)).collect();
+        nearest.refit(&moved);
+        let (ends, mut found) = ([Vec3::new(0.04, 0.05, 0.12), Vec3::new(0.06, 0.05, 0.13)], Vec::new());
+        for distance in [0.0, 0.01, 0.03, 1.0] {
+            nearest.around(&ends, distance, &mut found);
+            assert!(found.is_sorted());
+            for (triangle, corners) in (0..).zip(&block.surface().triangles) {
+                let far = corners.map(|node| ends.map(|end| (moved[node as usize] - end).norm()));
+                let least = far.as_flattened().iter().copied().fold(f64::INFINITY, f64::min);
+                let is_around = found.binary_search(&triangle).is_ok();
+                assert!(is_around || least > distance, "{triangle}");
+                // No box is larger than two cells with their shear, and the ends are 22 mm apart.
+                assert!(!is_around || least < 3.0_f64.sqrt() * distance + 0.06, "{triangle}");
+            }
+        }
     }
 }

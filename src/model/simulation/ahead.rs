@@ -200,13 +200,11 @@ impl Part {
             touch.skin.localise(&nodes, place, &mut skin);
             Touch::new(touch.shape, Arc::new(skin), Contact::default())
         };
-        let mut rows = Rows::with_room(whole.touches.len());
-        rows.make_room(nodes.len(), candidates.len());
-        let moving = Moving {
+        let mut moving = Moving {
             state: State::at_rest(body.rest()),
             forces: vec![Vec3::zeros(); nodes.len()],
             touches: whole.touches.iter().map(touch).collect(),
-            rows,
+            rows: Rows::default(),
             law: whole.law,
             stepping: whole.stepping,
             stride: whole.stride,
@@ -215,6 +213,7 @@ impl Part {
             inverse_masses,
             body: Stiffened::new(body),
         };
+        moving.make_room();
         Some(Self { moving, nodes, places, triangles, rim, drifts: Vec::new() })
     }
 

@@ -25,6 +25,12 @@ pub(super) struct Moving {
 }
 
 impl Moving {
+    /// Makes room for the places at which the tools that it has may touch.
+    pub(super) fn make_room(&mut self) {
+        self.rows = Rows::with_room(self.touches.len());
+        self.rows.make_room(self.inverse_masses.len(), (self.body.surface(), &self.candidates), &self.touches);
+    }
+
     /// Advances one haptic tick, or several in one step, along `motion` of each tool in all of that time, and shows `watch` the state at
     /// the start of every step that the stepping has.
     pub(super) fn advance(&mut self, ticks: u32, motion: impl Fn(usize) -> ToolMotion, watch: &mut impl FnMut(&State)) {

@@ -91,7 +91,8 @@ impl Tools {
             self.feelings.push(Feeling::new(global.wrench(number), &pose, mine, (&window.surface, rest)));
         }
         if self.touches.len() > 1 || self.touches[0].has_shape() {
-            self.rows.make_room(window.nodes.len(), window.candidates.len());
+            let surface = (&window.surface, &*window.candidates);
+            self.rows.make_room(window.nodes.len(), surface, &self.touches);
         }
     }
 
@@ -140,7 +141,7 @@ impl Tools {
             self.touches.swap(gone, self.present);
             self.numbers.swap(gone, self.present);
             self.feelings.swap(gone, self.present);
-            self.rows.forget();
+            self.rows.swap(gone, self.present);
         }
     }
 

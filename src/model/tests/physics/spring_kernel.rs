@@ -35,7 +35,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
-    fn a_network_has_the_forces_of_its_springs_in_any_order(
+    fn a_lattice_and_a_network_have_the_forces_of_their_springs_in_any_order(
         (block, mut state) in any_block(),
         collapsed in any::<prop::sample::Index>(),
         keys in prop::collection::vec(any::<u32>(), 3000),
@@ -57,6 +57,8 @@ proptest! {
         let permuted = State { positions: pick(&state.positions), velocities: pick(&state.velocities) };
         let permuted_rest = pick(block.rest());
         for set in sets() {
+            let mut lattice = block.clone().with_instruction_set(set).unwrap();
+            agree(&format!("lattice, {set:?}"), &forces(&mut lattice, &state), &expected)?;
             let mut straight = network(block.rest(), &springs).with_instruction_set(set).unwrap();
             agree(&format!("network, {set:?}"), &forces(&mut straight, &state), &expected)?;
             let mut network = network(&permuted_rest, &mixed).with_instruction_set(set).unwrap();
