@@ -13,7 +13,7 @@ const SPACING_M: f64 = 0.1 / 11.0;
 type Formula = fn(f64) -> [f64; 3];
 
 /// Name, length (s) and formula of every path file.
-const PATHS: [(&str, f64, Formula); 17] = [
+const PATHS: [(&str, f64, Formula); 18] = [
     ("bend.csv", 2.0, bend),
     ("demo.csv", 5.0, demo),
     ("drag.csv", 2.5, drag),
@@ -31,6 +31,7 @@ const PATHS: [(&str, f64, Formula); 17] = [
     ("pull_release.csv", 1.0, pull_release),
     ("slide.csv", 2.7, slide),
     ("stick_slip.csv", 3.6, stick_slip),
+    ("torso.csv", 60.0, torso),
 ];
 
 /// The minimum-jerk step from 0 to 1: how a hand moves from one point to another.
@@ -44,6 +45,14 @@ fn bend(t: f64) -> [f64; 3] {
     const LENGTH_M: f64 = 0.1;
     let down = 0.015 * (min_jerk((t - 0.2) / 0.6) - min_jerk((t - 1.2) / 0.6));
     [LENGTH_M - 0.6 * down * down / LENGTH_M, 0.01, 0.01 - down]
+}
+
+/// A sphere of 8 mm: press 12 mm into the middle of a block of 0.4 m, and on in circles of 3 cm, one in five seconds. To the micrometre.
+fn torso(t: f64) -> [f64; 3] {
+    const TOOL_M: f64 = 0.008;
+    let (y, x) = (0.4 * PI * t).sin_cos();
+    let depth = -0.003 + 0.0075 * (1.0 - (PI * t.min(1.0)).cos());
+    [0.2 + 0.03 * x, 0.2 + 0.03 * y, 0.4 + TOOL_M - depth].map(|coordinate| (coordinate * 1e6).round() / 1e6)
 }
 
 /// The top of the right lobe of the liver in `scenes/meshes` (m): that of its ellipsoid, half a millimetre above the mesh.
@@ -176,8 +185,10 @@ pub fn files() -> Vec<(&'static str, String)> {
 }
 
 fn csv(length_s: f64, position: Formula) -> String {
-    let time_s = |row: usize| row as f64 / 1000.0;
-    let last = (length_s * 1000.0).round() as usize;
+    // A path of a minute is a slow one.
+    let rows_per_s = if length_s > 10.0 { 25.0 } else { 1000.0 };
+    let time_s = |row: usize| row as f64 / rows_per_s;
+    let last = (length_s * rows_per_s).round() as usize;
     let rows: Vec<[f64; 3]> = (0..=last).map(|row| position(time_s(row))).collect();
     let mut text = String::from("t_s,x_m,y_m,z_m\n");
     for (row, position @ [x, y, z]) in rows.iter().enumerate() {

@@ -31,6 +31,7 @@ static SCENES: &[(&str, &str)] = files![
     "pull_release.toml"
     "soft_deep.toml"
     "stick_slip.toml"
+    "torso.toml"
     "two_hands.toml"
     "wave.toml"
     "wave_probe.toml"
@@ -58,6 +59,7 @@ static FILES: &[(&str, &str)] = files![
     "paths/pull_release.csv"
     "paths/slide.csv"
     "paths/stick_slip.csv"
+    "paths/torso.csv"
 ];
 
 /// A scene that is part of the program.

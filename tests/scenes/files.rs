@@ -54,6 +54,7 @@ fn every_scene_loads_and_says_what_it_shows() {
             "pull_release",
             "soft_deep",
             "stick_slip",
+            "torso",
             "two_hands",
             "wave",
             "wave_probe",

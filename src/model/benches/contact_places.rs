@@ -18,8 +18,8 @@ const TICKS: usize = 4_000;
 const WARM_UP: usize = 400;
 const STATES: usize = 250;
 /// Radii and depths (mm).
-const TOOLS: [[f64; 2]; 8] =
-    [[4.0, 1.0], [8.0, 3.0], [20.0, 3.0], [36.0, 3.0], [40.0, 4.0], [60.0, 5.0], [80.0, 5.0], [80.0, 7.0]];
+const TOOLS: [[f64; 2]; 9] =
+    [[4.0, 1.0], [8.0, 3.0], [20.0, 3.0], [36.0, 3.0], [40.0, 4.0], [60.0, 5.0], [80.0, 5.0], [80.0, 7.0], [80.0, 9.0]];
 
 fn main() {
     println!("| radius, depth (mm) | places | patch nodes | p50 (us) | p99 (us) |");

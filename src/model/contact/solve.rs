@@ -306,6 +306,7 @@ impl Row {
             return pressed + (speed - self.allowed) / self.along;
         }
         let left = self.along * pressed + (speed - self.allowed) - self.sunk.at(beside);
-        left / (self.along + self.sunk.slope)
+        // Most places do not press: whether they would is told without a division.
+        if left <= 0.0 { left } else { left / (self.along + self.sunk.slope) }
     }
 }
