@@ -98,6 +98,17 @@ mod tests {
         assert_eq!(Wish::read(r#"{"do":"stress","shown":true}"#), Some(Wish::Stress { shown: true }));
     }
 
+    /// Check that a limit that the page was told is not beyond it, or short of it, when the page says it again.
+    #[test]
+    fn numbers_come_back_as_they_were_told() {
+        for n in 0..2000 {
+            let stiffness = 1.0 + 5.0 * (1.7 * f64::from(n)).sin().abs();
+            let told = serde_json::json!({ "do": "change", "stiffness": stiffness }).to_string();
+            let change = Change { stiffness: Some(stiffness), ..Change::default() };
+            assert_eq!(Wish::read(&told), Some(Wish::Change(change)), "{told}");
+        }
+    }
+
     #[test]
     fn what_cannot_be_is_nothing() {
         for text in [
