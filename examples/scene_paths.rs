@@ -47,7 +47,8 @@ fn bend(t: f64) -> [f64; 3] {
     [LENGTH_M - 0.6 * down * down / LENGTH_M, 0.01, 0.01 - down]
 }
 
-/// A sphere of 8 mm: press 12 mm into the middle of a block of 0.4 m, and on in circles of 3 cm, one in five seconds. To the micrometre.
+/// A sphere of 8 mm on a block of 0.4 m: circles of 3 cm around its middle, one in five seconds, 12 mm deep after the first. To the
+/// micrometre.
 fn torso(t: f64) -> [f64; 3] {
     const TOOL_M: f64 = 0.008;
     let (y, x) = (0.4 * PI * t).sin_cos();

@@ -14,7 +14,7 @@ use crate::Vec3;
 /// The corners of a vicinity, and which of them are places that the tool may touch.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Corners {
-    /// Normals, longer where triangles are larger (m^2).
+    /// Normals of those within reach, longer where triangles are larger (m^2).
     outward: Vec<Vec3>,
     is_met: Vec<bool>,
 }

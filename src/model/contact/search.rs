@@ -269,7 +269,8 @@ mod tests {
             };
             for step in 0..600 {
                 let [t, next] = [step, step + 1].map(|step| (f64::from(step) * 1e-3).powi(2) * 4.0);
-                touch.steady.fineness = if step % 200 < 150 { 0.0 } else { f64::from(step % 200 - 150) / 50.0 };
+                touch.steady.fineness =
+                    if step % 200 < 150 { 0.0 } else { (f64::from(step % 200 - 150) / 30.0).min(1.0) };
                 let State { mut positions, mut velocities } = State::at_rest(block.rest());
                 for (x, v) in positions.iter_mut().zip(&mut velocities) {
                     let phase = 100.0 * x.x + 60.0 * x.y + 30.0 * t;

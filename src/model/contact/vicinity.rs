@@ -35,7 +35,7 @@ pub(super) struct Vicinity {
     before: f64,
     /// By node of the body: its place in `nodes`, from one on; zero for all others.
     places: Vec<u32>,
-    /// By node of the body: its place in `extents`, from one on. Working memory.
+    /// By node of the body: its place in `extents`, from one on, or other marks. Working memory.
     seen: Vec<u32>,
     /// Around the corners that were looked at: at both ends of the step, and smoothed or not.
     extents: Vec<Extent>,

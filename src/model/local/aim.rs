@@ -40,10 +40,10 @@ impl Aim {
     /// Puts the triangles for a window of tool number `index` that is made `after` seconds from now in place of `triangles`: the
     /// one under the tool then, those that it comes over in the `lead` seconds that follow if it goes on or back, and all that its
     /// shape may touch there. One that is made now begins with the triangle of the contact, one that is made ahead has room around
-    /// the shape; a tool that is glued goes nowhere else.
+    /// the shape; a tool that is glued goes nowhere else. The surface has to be where the last [`refit`](Self::refit) put it.
     ///
     /// # Real-time
-    /// For the global actor: bounded; `triangles` may grow.
+    /// For the global actor: bounded; allocates.
     pub fn triangles(
         &self,
         (simulation, index): (&Simulation, usize),

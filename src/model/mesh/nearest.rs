@@ -1,4 +1,4 @@
-//! The bridge to parry: the surface triangle nearest to a point. The only file that names it.
+//! The bridge to parry: the surface triangle nearest to a point, and those around it. The only file that names it.
 
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;

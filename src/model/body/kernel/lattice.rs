@@ -2,7 +2,7 @@
 //!
 //! For each of the 13 forward offsets, node p is joined to node p + delta in linear numbering; a bit for every node says
 //! whether the spring is there, so there are no borders to treat. Own forces stay in registers, and so do the opposite forces until all
-//! is known that three neighbouring offsets subtract further on.
+//! is known that neighbouring offsets subtract further on.
 
 use std::ops::Range;
 
