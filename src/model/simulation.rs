@@ -12,6 +12,7 @@ use std::sync::Arc;
 use crate::body::{Body, State, Stiffened, Stiffness};
 use crate::contact::{Coarseness, Contact, ContactPoint, Friction, Law, Rows, Skin, ToolMotion, ToolShape, Touch};
 use crate::error::ModelError;
+use crate::mesh::NearestTriangle;
 use crate::{Pose, Vec3, Wrench};
 use ahead::{Ahead, Glimpse};
 use moving::Moving;
@@ -460,12 +461,13 @@ impl Simulation {
     /// once; none for a point, which is over one.
     ///
     /// # Real-time
-    /// For the global actor: looks at every triangle; `triangles` may grow.
+    /// For the global actor: looks at every triangle; allocates.
     pub fn footprint(&self, tool: usize, pose: &Pose, margin: f64, triangles: &mut Vec<u32>) {
         if self.moving.touches[tool].has_shape() {
             let surface = (self.moving.body.surface(), &self.moving.state.positions[..]);
-            let reach = self.moving.touches[tool].reach(pose, margin);
-            Touch::footprint(surface, reach, 0..surface.0.triangles.len() as u32, triangles);
+            if let Ok(nearest) = NearestTriangle::new(surface.0, surface.1) {
+                self.moving.touches[tool].footprint(&nearest, surface, pose, margin, triangles);
+            }
         }
     }
 

@@ -11,7 +11,7 @@ use super::steady::Steady;
 use super::triangle::interpolate;
 use super::{Contact, ContactMode, ContactPoint, ToolShape};
 use crate::body::{Body, Stiffness};
-use crate::mesh::Surface;
+use crate::mesh::{NearestTriangle, Surface};
 use crate::{Pose, Vec3, Wrench};
 
 /// Places that a tool can touch at the same time; of more the deepest count. A sphere that is pressed 3 mm into elements of
@@ -154,20 +154,18 @@ impl Touch {
         is_free
     }
 
-    /// The ends of the tool's axis (m) at `pose`, and within how much of it (m) are the triangles that it touches, or may touch soon, or
-    /// if its radius were larger by `margin` (m).
-    pub(crate) fn reach(&self, pose: &Pose, margin: f64) -> ([Vec3; 2], f64) {
-        (self.shape.axis(pose), FOOTPRINT * self.shape.radius() + margin)
-    }
-
-    /// Appends those `among` the triangles of a surface with nodes at `positions` (m) that are within that `reach`.
+    /// Appends the triangles of a surface with nodes at `positions` (m), where `nearest` knows them, that the tool touches, or may touch
+    /// soon, at `pose`, or if its radius were larger by `margin` (m).
     pub(crate) fn footprint(
+        &self,
+        nearest: &NearestTriangle,
         (surface, positions): (&Surface, &[Vec3]),
-        (axis, near): ([Vec3; 2], f64),
-        among: impl IntoIterator<Item = u32>,
+        pose: &Pose,
+        margin: f64,
         triangles: &mut Vec<u32>,
     ) {
-        for triangle in among {
+        let (axis, near) = (self.shape.axis(pose), FOOTPRINT * self.shape.radius() + margin);
+        for triangle in nearest.around(&axis, near) {
             let corners = surface.triangles[triangle as usize].map(|node| positions[node as usize]);
             if is_near(&corners, &axis, near) && !triangles.contains(&triangle) {
                 triangles.push(triangle);

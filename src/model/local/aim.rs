@@ -1,7 +1,6 @@
 //! Which part of the surface the next local models have to hold.
 
 use super::forecast::ToolForecast;
-use crate::contact::Touch;
 use crate::error::ModelError;
 use crate::mesh::{NearestTriangle, Surface};
 use crate::simulation::Simulation;
@@ -65,11 +64,10 @@ impl Aim {
         if !touch.has_shape() {
             return;
         }
-        let (surface, mut near) = ((simulation.body().surface(), &*simulation.state().positions), Vec::new());
+        let surface = (simulation.body().surface(), &*simulation.state().positions);
         for position in ways {
-            let reach = touch.reach(&Pose { position, orientation: tool.orientation }, margin);
-            self.nearest.around(&reach.0, reach.1, &mut near);
-            Touch::footprint(surface, reach, near.iter().copied(), triangles);
+            let pose = Pose { position, orientation: tool.orientation };
+            touch.footprint(&self.nearest, surface, &pose, margin, triangles);
         }
     }
 }

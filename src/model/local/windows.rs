@@ -3,7 +3,7 @@
 
 use super::forecast::LOOKS;
 use crate::body::Body;
-use crate::contact::{ToolShape, Touch};
+use crate::contact::ToolShape;
 use crate::mesh::{NearestTriangle, Surface};
 use crate::simulation::Simulation;
 use crate::{Pose, Vec3};
@@ -102,7 +102,7 @@ impl Windows {
         let edges = corners.iter().map(|[a, b, c]| (b - a).norm() + (c - b).norm() + (a - c).norm());
         let edge = edges.sum::<f64>() / (3.0 * corners.len().max(1) as f64);
         let mut windows: Vec<Window> = Vec::new();
-        let (mut around, mut near) = (Vec::new(), Vec::new());
+        let mut around = Vec::new();
         // A point touches no more than the triangle that it is over.
         let nearest = touch.has_shape().then(|| NearestTriangle::new(body.surface(), rest).ok()).flatten();
         for Layer { spacing, more, way } in LAYERS {
@@ -126,9 +126,7 @@ impl Windows {
                 around.push(triangle);
                 let pose = Pose::from(middle + normal * (HEIGHT * shape.radius()));
                 if let Some(nearest) = &nearest {
-                    let reach = touch.reach(&pose, margin);
-                    nearest.around(&reach.0, reach.1, &mut near);
-                    Touch::footprint((body.surface(), rest), reach, near.iter().copied(), &mut around);
+                    touch.footprint(nearest, (body.surface(), rest), &pose, margin, &mut around);
                 }
                 let mut patch = Vec::new();
                 simulation.patch(tool, &around, size, &mut patch);

@@ -63,17 +63,17 @@ impl NearestTriangle {
         triangle
     }
 
-    /// Puts the triangles whose boxes come as near as `distance` (m) to the box around two `ends` in place of `found`, in increasing order.
+    /// The triangles whose boxes come as near as `distance` (m) to the box around two ends, in increasing order.
     ///
     /// # Real-time
-    /// For the global actor: bounded; `found` may grow.
-    pub(crate) fn around(&self, [one, other]: &[Vec3; 2], distance: f64, found: &mut Vec<u32>) {
+    /// For the global actor: bounded; allocates.
+    pub(crate) fn around(&self, [one, other]: &[Vec3; 2], distance: f64) -> Vec<u32> {
         let reach = Vec3::repeat(distance);
         let (low, high) = (one.inf(other) - reach, one.sup(other) + reach);
         let near = Aabb::new(Vector::from(low), Vector::from(high));
-        found.clear();
-        found.extend(self.mesh.bvh().intersect_aabb(&near));
+        let mut found: Vec<u32> = self.mesh.bvh().intersect_aabb(&near).collect();
         found.sort_unstable();
+        found
     }
 }
 
@@ -102,9 +102,9 @@ mod tests {
         let mut nearest = NearestTriangle::new(block.surface(), block.rest()).unwrap();
         let moved: Vec<Vec3> = block.rest().iter().map(|x| x + Vec3::new(0.3 * x.y, 0.0, 0.2 * x.x)).collect();
         nearest.refit(&moved);
-        let (ends, mut found) = ([Vec3::new(0.04, 0.05, 0.12), Vec3::new(0.06, 0.05, 0.13)], Vec::new());
+        let ends = [Vec3::new(0.04, 0.05, 0.12), Vec3::new(0.06, 0.05, 0.13)];
         for distance in [0.0, 0.01, 0.03, 1.0] {
-            nearest.around(&ends, distance, &mut found);
+            let found = nearest.around(&ends, distance);
             assert!(found.is_sorted());
             for (triangle, corners) in (0..).zip(&block.surface().triangles) {
                 let far = corners.map(|node| ends.map(|end| (moved[node as usize] - end).norm()));

@@ -327,14 +327,6 @@ impl<S: Simd> Eight<S> {
     }
 }
 
-/// Adds the forces of springs on `own`.
-#[inline(always)]
-fn add<S: Simd>(s: S, own: &mut Pushes<S>, more: Pushes<S>) {
-    for axis in 0..3 {
-        own[axis] = s.add(own[axis], more[axis]);
-    }
-}
-
 /// Adds up what all springs pull: `forces` begin an eight before the nodes.
 #[inline(always)]
 fn accumulate<S: Simd, C: Source<S>>(
@@ -386,7 +378,9 @@ fn accumulate<S: Simd, C: Source<S>>(
                 let of_spring = source.springs(s, coefficients, 1 + 3 * row + column, offset.rest_length);
                 let other = Eight::load(s, &motion, first + offset.delta);
                 pushes[column] = here.pull(s, &other, bits[column], of_spring, offset.rest_length);
-                add(s, &mut own, pushes[column]);
+                for axis in 0..3 {
+                    own[axis] = s.add(own[axis], pushes[column][axis]);
+                }
             }
             pending.left = if *bits == [0; 3] { pending.left - 1 } else { 2 };
             pending.take(s, pushes, &mut forces, first + rows[row][1].delta);
