@@ -13,7 +13,7 @@ use crate::units::plural;
 /// # Errors
 /// If standard output cannot be written.
 pub fn run() -> Result<(), Error> {
-    // What a run of the demo asks for is what every run at 1 kHz asks for.
+    // What a run of this scene asks for is what every run at 1 kHz asks for.
     let plan = Session::from_scene(Scene::demo()).build()?.plan()?;
     shared::print(&diagnosis(&plan))
 }

@@ -39,7 +39,7 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 /// Feel deformable objects: a detailed simulation at 30 Hz, a local model at 1 kHz, and a log of every tick.
 ///
-/// Without a subcommand, runs the built-in demo scene in real time for 5 seconds and reports how it went.
+/// Without a subcommand, runs the built-in scene `torso`, a body of 97,336 nodes, in real time for 10 seconds and reports how it went.
 #[derive(Debug, Parser)]
 #[command(name = "palpate", version = VERSION.as_str(), args_conflicts_with_subcommands = true)]
 struct Cli {
@@ -115,7 +115,7 @@ pub fn main() -> ExitCode {
         .init();
     let result = match Cli::try_parse() {
         Ok(Cli { command }) => match command {
-            None => run::demo(),
+            None => run::flagship(),
             Some(Command::List) => list::run(),
             Some(Command::Doctor) => doctor::run(),
             Some(Command::Run(args)) => run::run(&args),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use palpate::model::local::Kind as LocalModelKind;
-use palpate::scene::{ModelChoice, Scene};
+use palpate::scene::{BuiltIn, ModelChoice};
 use palpate::session::{Session, SessionBuilder};
 use palpate::{Error, ErrorKind};
 
@@ -14,6 +14,10 @@ use super::{files, progress, shared};
 const DEFAULT_LOG: &str = "palpate-run.mcap";
 /// Of a run in virtual time: it does not take the place of a real one, whose timing is still to be read.
 const VIRTUAL_LOG: &str = "palpate-virtual.mcap";
+
+/// What `palpate` alone runs: a body that `full` does not carry.
+const FLAGSHIP: &str = "torso";
+const SHOWN_S: f64 = 10.0;
 
 /// The arguments of `palpate run`.
 #[derive(Debug, clap::Args)]
@@ -45,12 +49,13 @@ pub struct RunArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Runs the built-in demo scene in real time.
+/// Runs the built-in scene that shows what the method is for in real time, its first [`SHOWN_S`] seconds.
 ///
 /// # Errors
 /// If the log cannot be written or the run fails.
-pub fn demo() -> Result<(), Error> {
-    execute(Session::from_scene(Scene::demo()), Path::new(DEFAULT_LOG), "demo scene")
+pub fn flagship() -> Result<(), Error> {
+    let scene = BuiltIn::named(FLAGSHIP).expect("it is built in").load();
+    execute(Session::from_scene(scene).duration_s(SHOWN_S), Path::new(DEFAULT_LOG), FLAGSHIP)
 }
 
 /// Runs a scene file.
