@@ -1,18 +1,20 @@
 //! Scenes that are part of the program, with the files that they name.
 
+use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::LazyLock;
 
 use super::body::Volume;
 use super::{Scene, TetrahedraSpec};
 use crate::devices::ToolPath;
 use crate::error::{Error, ErrorKind};
 
-macro_rules! files {
+macro_rules! scenes {
     ($($name:literal)*) => { &[$(($name, include_str!(concat!("../../scenes/", $name)))),*] };
 }
 
 /// The scenes of the folder `scenes/`.
-static SCENES: &[(&str, &str)] = files![
+static SCENES: &[(&str, &str)] = scenes![
     "cantilever.toml"
     "demo.toml"
     "device_faults.toml"
@@ -38,29 +40,19 @@ static SCENES: &[(&str, &str)] = files![
     "z_width.toml"
 ];
 
-/// What they name.
-static FILES: &[(&str, &str)] = files![
-    "meshes/cantilever.msh"
-    "meshes/liver.msh"
-    "paths/bend.csv"
-    "paths/demo.csv"
-    "paths/drag.csv"
-    "paths/finger.csv"
-    "paths/forceps_left.csv"
-    "paths/forceps_right.csv"
-    "paths/hand.csv"
-    "paths/hand_release.csv"
-    "paths/hold_right.csv"
-    "paths/hover.csv"
-    "paths/liver.csv"
-    "paths/liver_slide.csv"
-    "paths/palpate.csv"
-    "paths/press.csv"
-    "paths/pull_release.csv"
-    "paths/slide.csv"
-    "paths/stick_slip.csv"
-    "paths/torso.csv"
-];
+/// What they name, by name: the build script has packed it.
+static FILES: LazyLock<BTreeMap<String, String>> = LazyLock::new(|| {
+    const PACKED: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/scene_files"));
+    let all = miniz_oxide::inflate::decompress_to_vec(PACKED).expect("it was packed when this was built");
+    let (mut files, mut rest) = (BTreeMap::new(), &*String::from_utf8(all).expect("files of text"));
+    while let Some((head, after)) = rest.split_once('\n') {
+        let (name, length) = head.split_once(' ').expect("a name and a length");
+        let text;
+        (text, rest) = after.split_at(length.parse().expect("a length"));
+        files.insert(name.to_owned(), text.to_owned());
+    }
+    files
+});
 
 /// A scene that is part of the program.
 ///
@@ -112,7 +104,6 @@ impl BuiltIn {
 
 /// The text of a file that scenes name.
 fn text_of(name: &Path) -> Result<&'static str, Error> {
-    let found = FILES.iter().find(|(file, _)| Path::new(file) == name);
     let missing = || Error::new(ErrorKind::Io, "is not part of the program").at(name.display().to_string());
-    found.map(|(_, text)| *text).ok_or_else(missing)
+    name.to_str().and_then(|name| FILES.get(name)).map(|text| &**text).ok_or_else(missing)
 }
