@@ -52,6 +52,17 @@ impl Extent {
         sum
     }
 
+    /// True if what lies between these coordinates is at most so far from it along the axis (m).
+    #[inline]
+    pub(super) fn is_within(&self, distance: f64, axis: usize, coordinates: &[f64]) -> bool {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &coordinate in coordinates {
+            low = if coordinate < low { coordinate } else { low };
+            high = if coordinate > high { coordinate } else { high };
+        }
+        low <= self.high[axis] + distance && self.low[axis] - distance <= high
+    }
+
     /// On which of its six sides all of these places are, a bit for each. What has one in common for all its corners is outside.
     #[inline]
     pub(super) fn sides(&self, [from, to]: &[Vec3; 2]) -> u8 {
@@ -76,6 +87,8 @@ mod tests {
         assert_eq!(one.apart_squared(&Extent::around(&[at(4.0, -6.0, 1.0)])), 25.0);
         assert_eq!(Extent::around(&[at(-1.0, 0.0, -2.0)]).apart_squared(&one), 5.0);
         assert_eq!(one.apart_squared(&one), 0.0);
+        assert!(one.is_within(3.0, 0, &[4.0, 7.0]) && !one.is_within(2.9, 0, &[4.0, 7.0]));
+        assert!(one.is_within(2.0, 1, &[-9.0, -4.0]) && one.is_within(0.0, 2, &[-9.0, 9.0]));
         assert_eq!(
             one.and(&Extent::around(&[at(2.0, 0.0, -1.0)])),
             Extent { low: [0.0, -2.0, -1.0], high: [2.0, 0.0, 3.0] }

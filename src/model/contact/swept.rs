@@ -1,6 +1,7 @@
 //! Detection: a swept point against moving triangles, and a point that is already inside.
 
 use super::ToolMotion;
+use super::extent::Extent;
 use super::triangle::Projection;
 use crate::Vec3;
 use crate::mesh::Surface;
@@ -34,28 +35,34 @@ pub(super) fn find(
     tool: ToolMotion,
     d: f64,
 ) -> Option<Hit> {
-    let mut best: Option<Hit> = None;
+    let way = Extent::around([&tool.from.position, &tool.to.position]);
+    let (mut earliest, mut inside): (Option<Hit>, _) = (None, Inside::none());
     for &t in candidates {
-        if let Some(hit) = swept(surface, t, x, v, tool, d)
-            && best.is_none_or(|best| hit.share < best.share)
-        {
-            best = Some(hit);
+        let nodes = surface.triangles[t as usize].map(|node| node as usize);
+        // All but a few of a large body's triangles are so far that neither test would take them, most of them along the first axis.
+        let ends = |axis: usize| nodes.map(|node| [x[node][axis], x[node][axis] + v[node][axis] * d]);
+        if !(0..3).all(|axis| way.is_within(MAX_DEPTH, axis, ends(axis).as_flattened())) {
+            continue;
         }
+        let start = nodes.map(|node| x[node]);
+        let motion = nodes.map(|node| v[node] * d);
+        if let Some((weights, share)) = swept(&start, &motion, tool)
+            && earliest.is_none_or(|earliest| share < earliest.share)
+        {
+            earliest = Some(Hit { triangle: t, weights, share });
+        }
+        inside.look_at(t, &start, &tool.to.position);
     }
-    best.or_else(|| inside(surface, candidates, x, &tool.to.position))
+    earliest.or(inside.hit)
 }
 
-/// The tool against one moving triangle x(s) = x + s d v, s in [0, 1].
-fn swept(surface: &Surface, t: u32, x: &[Vec3], v: &[Vec3], tool: ToolMotion, d: f64) -> Option<Hit> {
-    let nodes = surface.triangles[t as usize].map(|node| node as usize);
-    let start = nodes.map(|node| x[node]);
-    let motion = nodes.map(|node| v[node] * d);
-    if !reaches(&start, &motion, tool) {
+/// The tool against one moving triangle x(s) = x + s d v, s in [0, 1]: where in it and when.
+fn swept(start: &[Vec3; 3], motion: &[Vec3; 3], tool: ToolMotion) -> Option<([f64; 3], f64)> {
+    if !reaches(start, motion, tool) {
         return None;
     }
     let corners = |share: f64| std::array::from_fn(|i| start[i] + motion[i] * share);
-    let (weights, share) = passed_through(corners, |share| tool.at(share).position)?;
-    Some(Hit { triangle: t, weights, share })
+    passed_through(corners, |share| tool.at(share).position)
 }
 
 /// When a moving point comes in through a moving triangle, and where in it.
@@ -99,36 +106,39 @@ fn reaches(start: &[Vec3; 3], motion: &[Vec3; 3], tool: ToolMotion) -> bool {
     })
 }
 
-/// The nearest triangle, if `point` is behind it, by face normals and less than 5 mm deep. Near a thin sheet a point that is
+/// The nearest triangle, if a point is behind it, by face normals and less than 5 mm deep. Near a thin sheet a point that is
 /// outside is behind the far side too: what is nearer to the front of a triangle is not inside.
-fn inside(surface: &Surface, candidates: &[u32], x: &[Vec3], point: &Vec3) -> Option<Hit> {
-    let (mut nearest, mut best) = (MAX_DEPTH, None);
-    for &t in candidates {
-        let corners = surface.triangles[t as usize].map(|node| x[node as usize]);
+struct Inside {
+    nearest: f64,
+    hit: Option<Hit>,
+}
+
+impl Inside {
+    fn none() -> Self {
+        Self { nearest: MAX_DEPTH, hit: None }
+    }
+
+    /// Takes triangle `t` with these corners if it is the nearest to `point` so far.
+    fn look_at(&mut self, t: u32, corners: &[Vec3; 3], point: &Vec3) {
         // A point behind the triangle and projecting into it lies in its box grown by the depth.
-        let near = (0..3).all(|axis| {
-            let low = corners.iter().map(|c| c[axis]).fold(f64::INFINITY, f64::min);
-            let high = corners.iter().map(|c| c[axis]).fold(f64::NEG_INFINITY, f64::max);
-            point[axis] >= low - MAX_DEPTH && point[axis] <= high + MAX_DEPTH
-        });
-        if !near {
-            continue;
+        let around = Extent::around([point]);
+        if !(0..3).all(|axis| around.is_within(MAX_DEPTH, axis, &corners.map(|corner| corner[axis]))) {
+            return;
         }
-        let Some(seen) = Projection::new(&corners, point) else { continue };
+        let Some(seen) = Projection::new(corners, point) else { return };
         if seen.is_inside(1e-9) {
-            if seen.distance.abs() < nearest {
-                nearest = seen.distance.abs();
-                best = (seen.distance < 0.0).then_some(Hit { triangle: t, weights: seen.weights, share: 0.0 });
+            if seen.distance.abs() < self.nearest {
+                self.nearest = seen.distance.abs();
+                self.hit = (seen.distance < 0.0).then_some(Hit { triangle: t, weights: seen.weights, share: 0.0 });
             }
-        } else if seen.distance > 0.0 && seen.distance < nearest {
+        } else if seen.distance > 0.0 && seen.distance < self.nearest {
             // In front of a ridge a point is over none of its triangles.
-            let beside = distance_to_edges(&corners, point);
-            if beside < nearest {
-                (nearest, best) = (beside, None);
+            let beside = distance_to_edges(corners, point);
+            if beside < self.nearest {
+                (self.nearest, self.hit) = (beside, None);
             }
         }
     }
-    best
 }
 
 /// From `point` to the nearest edge of the triangle `corners` (m).
@@ -148,8 +158,13 @@ mod tests {
     use super::*;
 
     fn found(body: &Block, point: Vec3) -> Option<Hit> {
+        found_at(body, body.rest(), point)
+    }
+
+    /// Where a resting point is inside of a `body` whose nodes rest at `x`.
+    fn found_at(body: &Block, x: &[Vec3], point: Vec3) -> Option<Hit> {
         let candidates: Vec<u32> = (0..body.surface().triangles.len() as u32).collect();
-        inside(body.surface(), &candidates, body.rest(), &point)
+        find(body.surface(), &candidates, x, &vec![Vec3::zeros(); x.len()], ToolMotion::straight(point, point), 1e-3)
     }
 
     #[test]
@@ -171,8 +186,7 @@ mod tests {
         // Bent upwards along a row of nodes; a point above the ridge is over neither of its slopes.
         let sheet = Block::builder([5, 4, 3], [0.04, 0.03, 0.001]).fix(Face::ZMin).build().unwrap();
         let bent: Vec<Vec3> = sheet.rest().iter().map(|x| x - Vec3::z() * (x.x - 0.02).abs()).collect();
-        let candidates: Vec<u32> = (0..sheet.surface().triangles.len() as u32).collect();
-        let at = |z: f64| inside(sheet.surface(), &candidates, &bent, &Vec3::new(0.02, 0.0153, z));
+        let at = |z: f64| found_at(&sheet, &bent, Vec3::new(0.02, 0.0153, z));
         assert_eq!(at(0.0015), None);
         assert!(at(0.0008).is_some());
     }
