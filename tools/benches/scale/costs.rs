@@ -24,7 +24,7 @@ const PERIODS_AHEAD: f64 = 2.25;
 /// Of `predictive`, and of the models whose patch is the paper's.
 const PATCH: [usize; 3] = [6, 6, 3];
 const SMALL_PATCH: [usize; 3] = [4, 4, 2];
-const STATES: usize = 150;
+const STATES: usize = Basis::DEFAULT_STATES;
 /// A basis is left out if it is expected to take longer (s).
 const LONGEST_BASIS_S: f64 = 120.0;
 const ROUNDS: usize = 3;
@@ -53,8 +53,8 @@ pub struct BasisCost {
 pub struct Surroundings {
     pub cost: BasisCost,
     bases: Bases,
+    /// That of `predictive`.
     patch: Vec<u32>,
-    small_patch: Vec<u32>,
 }
 
 impl Surroundings {
@@ -63,12 +63,8 @@ impl Surroundings {
         let (mut sim, _) = simulation(block(nodes)?, 1000.0)?;
         advance(&mut sim, 0.0, BEGIN);
         let touched = sim.contact(0).triangle.ok_or_else(no_contact)?;
-        let around = |size| {
-            let mut patch = Vec::new();
-            sim.body().patch(&[touched], size, &mut patch);
-            patch
-        };
-        let [patch, small_patch] = [PATCH, SMALL_PATCH].map(around);
+        let mut patch = Vec::new();
+        sim.body().patch(&[touched], PATCH, &mut patch);
         let resting = RestingBody::new(sim.body()).ok_or_else(no_contact)?;
         // A direct factorisation of a body in space grows with the sixth power of its edge.
         let last = smaller.last().and_then(|last| Some((last.nodes, last.seconds?)));
@@ -79,7 +75,7 @@ impl Surroundings {
         };
         if expected > LONGEST_BASIS_S {
             eprintln!("{nodes}^3: a basis is expected to take {expected:.0} s, left out");
-            return Ok(Self { cost: BasisCost { nodes, seconds: None }, bases: Bases::default(), patch, small_patch });
+            return Ok(Self { cost: BasisCost { nodes, seconds: None }, bases: Bases::default(), patch });
         }
         let begun = Instant::now();
         let mut bases = Bases::default();
@@ -88,7 +84,7 @@ impl Surroundings {
         }
         let seconds = begun.elapsed().as_secs_f64();
         eprintln!("{nodes}^3: a basis takes {seconds:.2} s");
-        Ok(Self { cost: BasisCost { nodes, seconds: Some(seconds) }, bases, patch, small_patch })
+        Ok(Self { cost: BasisCost { nodes, seconds: Some(seconds) }, bases, patch })
     }
 }
 
@@ -149,8 +145,9 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
     // Some 90 % of the ticks take no longer than 1.1 times the median; the mean would have the stalls of the machine in it.
     let follow = Nanos(full[0].0 * ticks_of_period as u64);
     let horizon = (PERIODS_AHEAD * rate / GLOBAL_HZ).ceil() as u32 + 1;
-    let mut of = |kind: Kind, patch: &[u32], bases: &Bases| -> Result<(Nanos, Tick), Error> {
-        let template = Template::new(kind, PATCH, sim.body())?;
+    let mut of = |kind: Kind, size: [usize; 3]| -> Result<(Nanos, Tick), Error> {
+        let Surroundings { patch, bases, .. } = surroundings;
+        let template = Template::new(kind, size, sim.body())?;
         let mut model = template.empty();
         let mut least = Nanos(u64::MAX);
         // The first build makes memory.
@@ -164,8 +161,8 @@ pub fn measure(nodes: usize, rate: f64, surroundings: &Surroundings) -> Result<C
         });
         Ok((least, served))
     };
-    let (build_patch, patch) = of(Kind::Patch, &surroundings.small_patch, &Bases::default())?;
-    let (build, predictive) = of(Kind::Predictive, &surroundings.patch, &surroundings.bases)?;
+    let (build_patch, patch) = of(Kind::Patch, SMALL_PATCH)?;
+    let (build, predictive) = of(Kind::Predictive, PATCH)?;
     let substeps = sim.stepping().substeps;
     Ok(Costs {
         nodes,
