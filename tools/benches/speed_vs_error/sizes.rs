@@ -51,7 +51,7 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
         variants.truncate(2);
     }
     let mut text = "## Sizes and substeps\n\n\
-        One setting at a time differs from the default: for `predictive` patch 6 x 6 x 3 and basis 150, for the others patch 4 x 4 x 2; 2 substeps per ms. Results of \
+        One setting at a time differs from the default: for `predictive` patch 6 x 6 x 3 and basis 250, for the others patch 4 x 4 x 2; 2 substeps per ms. Results of \
         the global model are one period late, and the drag is run to its middle (1.2 s). The reference `full` has the same substeps.\n"
         .to_owned();
     let mut pictures = Vec::new();
