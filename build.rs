@@ -1,4 +1,4 @@
-//! Packs the files that built-in scenes name: as text they would be an eighth of the command.
+//! Packs the files that built-in scenes name: as text they would be an eighth of a release build of the command.
 
 use std::path::Path;
 

@@ -74,7 +74,7 @@ impl Scene {
         Ok(Self { scene, table, base, name: path.display().to_string(), is_built_in: false })
     }
 
-    /// The scene that `palpate` alone runs: five seconds of pressing, dragging, circling and tapping.
+    /// The built-in scene `demo`: five seconds of pressing, dragging, circling and tapping.
     #[staticmethod]
     fn demo() -> Self {
         let scene = EngineScene::demo();

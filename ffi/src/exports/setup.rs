@@ -51,7 +51,7 @@ pub unsafe extern "C" fn palpate_setup_from_toml(
     }
 }
 
-/// Sets a session up with the built-in scene: a tool that presses a block and drags over it.
+/// Sets a session up with the built-in scene `demo`: a tool that presses a block and drags over it.
 ///
 /// # Safety
 /// `setup` is null or can be written.

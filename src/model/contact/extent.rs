@@ -52,7 +52,7 @@ impl Extent {
         sum
     }
 
-    /// True if what lies between these coordinates is at most so far from it along the axis (m).
+    /// True if the box, grown by `distance` (m) along `axis`, meets the span of `coordinates`.
     #[inline]
     pub(super) fn is_within(&self, distance: f64, axis: usize, coordinates: &[f64]) -> bool {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);

@@ -39,7 +39,8 @@ pub(super) fn find(
     let (mut earliest, mut inside): (Option<Hit>, _) = (None, Inside::none());
     for &t in candidates {
         let nodes = surface.triangles[t as usize].map(|node| node as usize);
-        // All but a few of a large body's triangles are so far that neither test would take them, most of them along the first axis.
+        // Most triangles of a large body are farther from the tool's way along some axis, usually the first: neither test takes those, as long
+        // as triangles are below 500 m.
         let ends = |axis: usize| nodes.map(|node| [x[node][axis], x[node][axis] + v[node][axis] * d]);
         if !(0..3).all(|axis| way.is_within(MAX_DEPTH, axis, ends(axis).as_flattened())) {
             continue;

@@ -103,7 +103,7 @@ pub fn text(all: &[Costs]) -> String {
         "## What holds\n\nOne core for the haptic group, one for the global one. `full` fits if its p99 fits the period of a \
          haptic tick. `predictive` fits if a haptic tick that catches up ({CATCH_UP} ticks at p50, or one at p99) fits that period \
          and the global group takes less than one core. Percentages above 100 say how many cores it would need. *With the longest stable steps* is what the global group would take \
-         if its model made one step for several ticks where that is stable; today it makes at least one per haptic tick. Device, \
+         if its model made one step for several ticks (`ticks_per_step`) where that is stable. Device, \
          records and emptied caches of a session come on top: its ticks are in the table of errors.\n\n{}\n{}\n",
         table(&heads, 2, &rows),
         lines.join("\n")

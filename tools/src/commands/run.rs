@@ -15,9 +15,10 @@ const DEFAULT_LOG: &str = "palpate-run.mcap";
 /// Of a run in virtual time: it does not take the place of a real one, whose timing is still to be read.
 const VIRTUAL_LOG: &str = "palpate-virtual.mcap";
 
-/// What `palpate` alone runs: a body that `full` does not carry.
+/// What `palpate` alone runs: a body that `full` does not carry, or a small one where the machine is too slow for it.
 const FLAGSHIP: &str = "torso";
 const SHOWN_S: f64 = 10.0;
+const SMALL: &str = "demo";
 
 /// The arguments of `palpate run`.
 #[derive(Debug, clap::Args)]
@@ -49,13 +50,21 @@ pub struct RunArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Runs the built-in scene that shows what the method is for in real time, its first [`SHOWN_S`] seconds.
+/// Runs, in real time, the first [`SHOWN_S`] seconds of the built-in scene that shows what the method is for.
 ///
 /// # Errors
 /// If the log cannot be written or the run fails.
 pub fn flagship() -> Result<(), Error> {
-    let scene = BuiltIn::named(FLAGSHIP).expect("it is built in").load();
-    execute(Session::from_scene(scene).duration_s(SHOWN_S), Path::new(DEFAULT_LOG), FLAGSHIP)
+    let scene = |name| Session::from_scene(BuiltIn::named(name).expect("it is built in").load());
+    let log = Path::new(DEFAULT_LOG);
+    match execute(scene(FLAGSHIP).duration_s(SHOWN_S), log, FLAGSHIP) {
+        // Nothing is wrong with a scene that is built in.
+        Err(error) if error.kind() == ErrorKind::Scene => {
+            shared::complain(format_args!(" WARN {error}; the scene `{SMALL}` runs instead"));
+            execute(scene(SMALL), log, SMALL)
+        }
+        ended => ended,
+    }
 }
 
 /// Runs a scene file.

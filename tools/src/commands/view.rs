@@ -61,7 +61,7 @@ pub fn run(args: &ViewArgs) -> Result<(), Error> {
     if let (Some(path), Some(out)) = (&args.scene, &args.out) {
         files::keep_inputs(&files::inputs_of(path, &scene), out)?;
     }
-    // The demo shows the method; whoever pushes it is to feel the body itself, where that fits.
+    // The demo names `predictive`; whoever pushes it is to feel the body itself, where that fits.
     let of_demo = (args.scene.is_none() && args.global.address.is_none()).then_some(ModelChoice::Auto);
     if let Some(model) = args.model.or(of_demo) {
         scene = scene.with_model(model);

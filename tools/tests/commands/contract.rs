@@ -395,7 +395,7 @@ fn a_scene_of_every_model_runs_and_names_it() {
     }
 }
 
-/// Ten seconds of real time. Check what is written and said, never how late it was.
+/// Ten seconds of real time, or five of a smaller scene on a machine that is too slow. Check what is written and said, never how late it was.
 #[test]
 fn the_command_alone_runs_the_flagship_in_real_time() {
     let folder = Folder::new();
@@ -404,14 +404,17 @@ fn the_command_alone_runs_the_flagship_in_real_time() {
     let Called { code, out: report, err } = folder.call(&[]);
     assert_eq!(code, Some(0), "{err}");
     assert!(err.lines().all(|line| line.starts_with(" WARN")), "{err}");
-    assert!(started.elapsed().as_secs_f64() >= 9.9);
+    let is_slow = err.contains("`demo` runs instead");
+    let seconds = if is_slow { 5 } else { 10 };
+    assert!(started.elapsed().as_secs_f64() >= seconds as f64 - 0.1);
     assert_eq!(folder.files(), ["palpate-run.mcap", "path.csv", "scene.toml"]);
-    for word in ["10.000 s of real time", "lateness", "execution", "skipped", "missed", "granted", "palpate-run.mcap"] {
+    assert!(report.contains(&format!(" {seconds}.000 s of real time")), "{report}");
+    for word in ["lateness", "execution", "skipped", "missed", "granted", "palpate-run.mcap"] {
         assert!(report.contains(word), "no {word:?} in\n{report}");
     }
     let json = folder.succeed(&["timing", "palpate-run.mcap", "--json"]);
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
-    for (group, periods) in [("local", 10_001), ("global", 301)] {
+    for (group, periods) in [("local", 1000 * seconds + 1), ("global", 30 * seconds + 1)] {
         let groups = json["groups"].as_array().unwrap();
         let group = groups.iter().find(|told| told["name"] == group).unwrap();
         let count = |key: &str| group[key].as_u64().unwrap();
