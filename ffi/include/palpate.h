@@ -547,7 +547,7 @@ enum PalpateCode palpate_setup_from_toml(const char *toml,
                                          struct PalpateSetup *setup);
 
 /**
- * Sets a session up with the built-in scene: a tool that presses a block and drags over it.
+ * Sets a session up with the built-in scene `demo`: a tool that presses a block and drags over it.
  *
  * # Safety
  * `setup` is null or can be written.
