@@ -36,7 +36,8 @@ pub(super) fn find(
     d: f64,
 ) -> Option<Hit> {
     let way = Extent::around([&tool.from.position, &tool.to.position]);
-    let (mut earliest, mut inside): (Option<Hit>, _) = (None, Inside::none());
+    let mut earliest: Option<Hit> = None;
+    let mut inside = Inside::none();
     for &t in candidates {
         let nodes = surface.triangles[t as usize].map(|node| node as usize);
         // Most triangles of a large body are farther from the tool's way along some axis, usually the first: neither test takes those, as long

@@ -2,6 +2,7 @@
 
 use palpate::Error;
 use palpate::model::local::Kind as LocalModelKind;
+use palpate::model::surroundings::Basis;
 use palpate::runtime::Rate;
 use palpate::scene::Scene;
 use palpate_cli::compare::{CompareOptions, Comparison, Measured};
@@ -50,10 +51,12 @@ pub fn part(is_quick: bool) -> Result<Part, Error> {
     if is_quick {
         variants.truncate(2);
     }
-    let mut text = "## Sizes and substeps\n\n\
-        One setting at a time differs from the default: for `predictive` patch 6 x 6 x 3 and basis 250, for the others patch 4 x 4 x 2; 2 substeps per ms. Results of \
-        the global model are one period late, and the drag is run to its middle (1.2 s). The reference `full` has the same substeps.\n"
-        .to_owned();
+    let mut text = format!(
+        "## Sizes and substeps\n\n\
+         One setting at a time differs from the default: for `predictive` patch 6 x 6 x 3 and basis {}, for the others patch 4 x 4 x 2; 2 substeps per ms. Results of \
+         the global model are one period late, and the drag is run to its middle (1.2 s). The reference `full` has the same substeps.\n",
+        Basis::DEFAULT_STATES
+    );
     let mut pictures = Vec::new();
     for name in names {
         let mut measured = Vec::new();
