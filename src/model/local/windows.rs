@@ -132,7 +132,7 @@ impl Windows {
                 simulation.patch(tool, &around, size, &mut patch);
                 windows.push(Window { middle: *middle, normal, reach: 0.0, patch, layer: first });
             }
-            extend_over_small(body, &mut windows[first..]);
+            extend_over_small(body, &mut windows, first);
         }
         for Window { middle, reach, patch, .. } in &mut windows {
             *reach = patch.iter().map(|&node| (rest[node as usize] - *middle).norm()).fold(0.0, f64::max);
@@ -285,19 +285,25 @@ impl Windows {
     }
 }
 
-/// Lets `windows` of one size take all of a `body` that costs a tick no more than such a window with its ring does, or little: nothing is
-/// around it then that would have to be foretold or reduced.
-fn extend_over_small(body: &dyn Body, windows: &mut [Window]) {
+/// Lets the `windows` of one size, from the `first` on, take all of a `body` that costs a tick no more than such a window with its ring does,
+/// or little: nothing is around it then that would have to be foretold or reduced.
+///
+/// Where all of them do, the first is left: one is as good as another, and each would be looked at in every period.
+fn extend_over_small(body: &dyn Body, windows: &mut Vec<Window>, first: usize) {
     let all: Vec<u32> = (0..).zip(body.inverse_masses()).filter(|&(_, &w)| w > 0.0).map(|(node, _)| node).collect();
-    let parts = windows.iter().map(|window| &window.patch).filter(|patch| patch.len() < all.len());
-    let Some(sample) = parts.max_by_key(|patch| patch.len()) else { return };
-    let Some(near) = body.restriction(sample) else { return };
-    let with_ring = 1.0 + RING * near.ring(sample.len()).len() as f64 / sample.len() as f64;
-    let most = with_ring.max(SMALL);
-    for Window { patch, .. } in windows {
-        if all.len() as f64 <= most * patch.len() as f64 {
-            all.clone_into(patch);
-        }
+    let of_size = &mut windows[first..];
+    let parts = of_size.iter().map(|window| &window.patch).filter(|patch| patch.len() < all.len());
+    if let Some(sample) = parts.max_by_key(|patch| patch.len())
+        && let Some(near) = body.restriction(sample)
+    {
+        let with_ring = 1.0 + RING * near.ring(sample.len()).len() as f64 / sample.len() as f64;
+        let most = with_ring.max(SMALL);
+        let is_small = |patch: &[u32]| all.len() as f64 <= most * patch.len() as f64;
+        let small = of_size.iter_mut().filter(|window| is_small(&window.patch));
+        small.for_each(|window| all.clone_into(&mut window.patch));
+    }
+    if of_size.iter().all(|window| window.patch == all) {
+        windows.truncate(first + 1);
     }
 }
 
